@@ -1,0 +1,41 @@
+"""What every wire model shares: strict shape, finite numbers, UTC times, and the identifier types."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Annotated
+
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
+
+
+class Model(BaseModel):
+    """Base of all wire models: unknown fields and non-finite numbers are refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+def _to_utc(value: datetime) -> datetime:
+    return value.astimezone(UTC)
+
+
+#: RFC 3339 time with an offset; held, stored and sent as UTC.
+UtcTime = Annotated[AwareDatetime, AfterValidator(_to_utc)]
+
+#: EPC hex or ISO 15693 UID of a tag; the primary key of an object. Upper-cased.
+Tag = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9._:-]{1,64}$", to_upper=True)]
+RoomId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+AgentId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+#: In scenario files any name; on the wire ``agent/n`` (checked by the batch, which knows the agent).
+LabelId = Annotated[str, StringConstraints(min_length=1, max_length=129, pattern=r"^[^\x00-\x1f]+$")]
+#: JAN / EAN / GTIN digits; the server verifies the check digit.
+Jan = Annotated[str, StringConstraints(pattern=r"^(\d{8}|\d{12,14})$")]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=200, strip_whitespace=True, pattern=r"^[^\x00]+$")]
+
+#: Metres in the room frame. The bound keeps squared distances finite.
+Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
+Xy = tuple[Metres, Metres]
+#: (x, y, theta): metres, radians counter-clockwise.
+Pose = tuple[Metres, Metres, Annotated[float, Field(ge=-1e3, le=1e3)]]
+Polygon = Annotated[list[Xy], Field(min_length=3, max_length=1000)]
+Grams = Annotated[float, Field(ge=0, le=1e7)]
+Probability = Annotated[float, Field(ge=0, le=1)]
