@@ -1,1 +1,1 @@
-"""Placeholder docstring."""
+"""API library for robot code and the ``tms`` command."""

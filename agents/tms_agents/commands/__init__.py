@@ -1,0 +1,1 @@
+"""Subcommands of ``tms`` that run on sensor hosts."""

@@ -1,0 +1,1 @@
+"""Subcommands of ``tms`` that need nothing but the client."""
