@@ -1,1 +1,1 @@
-"""Placeholder docstring."""
+"""Alembic migrations of the server's database; they run from the installed wheel."""

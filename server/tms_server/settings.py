@@ -26,8 +26,12 @@ class Settings(BaseSettings):
     filter: str = Field(default="particle", pattern="^(particle|exact)$")
     budget: int = Field(default=1000, ge=1, description="hypotheses kept per room by the particle filter")
     holdback_s: float = Field(default=0.0, ge=0, description="wait this long for late arrivals before folding")
-    patience_s: float = Field(default=5.0, ge=0, description="a vanished label nobody announced is an anomaly after this")
-    retention_s: float | None = Field(default=None, description="older arrivals change no belief; None keeps everything")
+    patience_s: float = Field(
+        default=5.0, ge=0, description="a vanished label nobody announced is an anomaly after this"
+    )
+    retention_s: float | None = Field(
+        default=None, description="older arrivals change no belief; None keeps everything"
+    )
     snapshot_every: int = Field(default=1000, ge=1, description="log records between two stored snapshots")
     silent_after_s: float = Field(default=30.0, gt=0, description="an agent that posts nothing this long is silent")
 
@@ -36,7 +40,10 @@ class Settings(BaseSettings):
         if self.database_url is None:
             return f"sqlite+aiosqlite:///{self.data_dir / 'tms.sqlite'}"
         url = self.database_url
-        for plain, driver in (("postgresql://", "postgresql+asyncpg://"), ("sqlite://", "sqlite+aiosqlite://")):
+        for plain, driver in (
+            ("postgresql://", "postgresql+asyncpg://"),
+            ("sqlite://", "sqlite+aiosqlite://"),
+        ):
             if url.startswith(plain):
                 return driver + url.removeprefix(plain)
         return url

@@ -1,0 +1,1 @@
+"""Agents: who is alive, since when, how late."""

@@ -1,0 +1,13 @@
+"""``uvicorn tms_server.asgi:app``: the one module with a side effect on import."""
+
+from __future__ import annotations
+
+from tms_server.compiled import use_compiled_cache
+from tms_server.settings import Settings
+
+settings = Settings()
+use_compiled_cache(settings.data_dir)
+
+from tms_server.app import create_app  # noqa: E402  (numba reads its cache directory on import)
+
+app = create_app(settings)

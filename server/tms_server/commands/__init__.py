@@ -1,0 +1,1 @@
+"""Subcommands of `tms` that the server package brings."""

@@ -1,0 +1,1 @@
+"""Engines per dialect, tables, sessions, migrations and the one-process lock."""

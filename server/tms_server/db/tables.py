@@ -1,0 +1,155 @@
+"""Every table. Times are int64 microseconds UTC; documents are JSON text; both dialects hold the same types."""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Float,
+    ForeignKey,
+    Index,
+    LargeBinary,
+    MetaData,
+    Text,
+    UniqueConstraint,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+NAMING = {
+    "ix": "ix_%(table_name)s_%(column_0_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+#: Text compares by code point in both databases, so that paging and folding see one order.
+_TEXT = Text().with_variant(Text(collation="C"), "postgresql")
+
+
+class Base(DeclarativeBase):
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map = {int: BigInteger, str: _TEXT, float: Float(53), bytes: LargeBinary, bool: Boolean}
+
+
+class ProductRow(Base):
+    __tablename__ = "products"
+
+    jan: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    size_m: Mapped[str | None]
+    weight_g: Mapped[float | None]
+    weight_sd_g: Mapped[float | None]
+    category: Mapped[str | None]
+    shape: Mapped[str | None]
+    updated_at: Mapped[int]
+
+
+class ObjectRow(Base):
+    __tablename__ = "objects"
+
+    tag: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    synonyms: Mapped[str]
+    jan: Mapped[str | None] = mapped_column(ForeignKey("products.jan"), index=True)
+    size_m: Mapped[str | None]
+    weight_g: Mapped[float | None]
+    weight_sd_g: Mapped[float | None]
+    category: Mapped[str | None]
+    room: Mapped[str | None] = mapped_column(ForeignKey("rooms.room"), index=True)
+    tracking: Mapped[str]
+    tag_pose: Mapped[str | None]
+    user_memory: Mapped[bytes | None]
+    #: Names, synonyms and category folded for search (see objects/search text rules).
+    search_text: Mapped[str]
+    created_at: Mapped[int]
+    updated_at: Mapped[int]
+
+
+class RoomRow(Base):
+    __tablename__ = "rooms"
+
+    room: Mapped[str] = mapped_column(primary_key=True)
+    body: Mapped[str]
+    created_at: Mapped[int]
+    updated_at: Mapped[int]
+    #: Newest log offset; its row lock orders the offsets of a room.
+    head: Mapped[int] = mapped_column(default=0)
+
+
+class LogRow(Base):
+    """The room log: the truth from which every belief is folded.
+
+    Observations carry the agent's (agent, seq); registry records (object registered, room changed ...) the agent
+    ``@<room>``, a name that no agent can have, and the room's own running number.
+    """
+
+    __tablename__ = "log"
+    __table_args__ = (
+        Index("ix_log_position", "room", "observed_at", "agent", "seq"),
+        UniqueConstraint("agent", "seq", name="uq_log_agent"),
+    )
+
+    room: Mapped[str] = mapped_column(primary_key=True)
+    offset: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    agent: Mapped[str]
+    seq: Mapped[int]
+    observed_at: Mapped[int]
+    received_at: Mapped[int]
+    kind: Mapped[str]
+    body: Mapped[str]
+
+
+class AgentRow(Base):
+    __tablename__ = "agents"
+
+    agent: Mapped[str] = mapped_column(primary_key=True)
+    room: Mapped[str]
+    next_seq: Mapped[int]
+    received: Mapped[int]
+    first_seen: Mapped[int]
+    last_seen: Mapped[int]
+    last_observed_at: Mapped[int]
+    state: Mapped[str]
+    why: Mapped[str]
+
+
+class UnknownTagRow(Base):
+    __tablename__ = "unknown_tags"
+
+    tag: Mapped[str] = mapped_column(primary_key=True)
+    room: Mapped[str] = mapped_column(primary_key=True)
+    agent: Mapped[str]
+    #: Smallest and largest observed_at, whatever the order of arrival.
+    first_seen: Mapped[int]
+    last_seen: Mapped[int]
+    count: Mapped[int]
+    label: Mapped[str | None]
+    x: Mapped[float | None]
+    y: Mapped[float | None]
+
+
+class SnapshotRow(Base):
+    """A folded state: of all records up to ``offset``, the last of them (in fold order) at the given position."""
+
+    __tablename__ = "snapshots"
+
+    room: Mapped[str] = mapped_column(primary_key=True)
+    offset: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    observed_at: Mapped[int]
+    agent: Mapped[str]
+    seq: Mapped[int]
+    created_at: Mapped[int]
+    body: Mapped[bytes]
+
+
+class KeyRow(Base):
+    __tablename__ = "api_keys"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    #: SHA-256 of the secret (256 random bits: nothing to stretch).
+    digest: Mapped[bytes]
+    scopes: Mapped[str]
+    created_at: Mapped[int]
+    revoked_at: Mapped[int | None]

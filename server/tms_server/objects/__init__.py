@@ -1,0 +1,1 @@
+"""Objects by tag, products by JAN, intake and the unknown-tag list."""

@@ -1,0 +1,1 @@
+"""Rooms: frame, outline, furniture, sensors."""
