@@ -24,6 +24,6 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError(f"settings: {error}") from error
     settings.data_dir.mkdir(parents=True, exist_ok=True)
     use_compiled_cache(settings.data_dir)
-    from tms_server.serving import serve  # numba reads its cache directory on import
+    from tms_server.commands.serving import serve  # numba reads its cache directory on import
 
     return serve(settings)

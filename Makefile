@@ -1,0 +1,56 @@
+# `make demo` and `make test` do all the set-up themselves: virtual environment, packages, browser.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo test test-fast check format bench faults realdata clean help
+
+help:
+	@echo "make demo      run the demo until Ctrl-C"
+	@echo "make test      set up and run all tests (SQLite, PostgreSQL, Chromium)"
+	@echo "make check     ruff, mypy strict, import arrows"
+	@echo "make bench     the published numbers of docs/benchmarks.md"
+	@echo "make faults    the long fault tests (30 kills and more)"
+
+demo: $(READY)
+	$(BIN)/tms demo $(DEMO)
+
+test: $(READY) chromium check
+	$(BIN)/python -m pytest -n $(or $(TEST_JOBS),2) $(PYTEST)
+
+check: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q tests/test_arrows.py
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(READY)
+	$(BIN)/python benchmarks/placement.py
+	$(BIN)/python benchmarks/ingest.py
+
+faults: $(READY)
+	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults
+
+realdata: $(READY)
+	$(BIN)/python -m pytest -q -m realdata
+
+# The page is tested in a real browser: Debian's chromium, installed where it is missing.
+.PHONY: chromium
+chromium:
+	@command -v chromium >/dev/null || { \
+	  [ "$$(id -u)" = 0 ] && SUDO= || SUDO=sudo; \
+	  echo "installing chromium"; $$SUDO apt-get update -qq && \
+	  DEBIAN_FRONTEND=noninteractive $$SUDO apt-get install -y -qq --no-install-recommends chromium fonts-noto-cjk >/dev/null; }
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf $(VENV) .tms .hypothesis .pytest_cache .mypy_cache .ruff_cache

@@ -1,0 +1,77 @@
+"""Imports point one way: schemas <- client <- agents, schemas <- server; belief and mapping know no HTTP or SQL."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+#: Package (or folder of one) -> what it may import beside the standard library. The longest prefix decides.
+ALLOWED: dict[str, set[str]] = {
+    "tms_schemas": {"pydantic"},
+    "tms_client": {"tms_schemas", "pydantic", "httpx", "websockets"},
+    "tms_agents": {"tms_schemas", "tms_client", "pydantic", "pydantic_settings", "numpy", "numba", "scipy", "serial"},
+    "tms_agents/slam": {"tms_agents/slam", "numpy", "numba", "scipy"},
+    "tms_server": {
+        *("tms_schemas", "tms_migrations", "pydantic", "pydantic_settings", "pydantic_core", "fastapi", "starlette"),
+        *("sqlalchemy", "alembic", "uvicorn", "numpy", "numba", "biip", "epcpy", "fastapi_offline", "asyncpg"),
+    },
+    "tms_server/commands": {"tms_schemas", "tms_server", "tms_client", "uvicorn"},
+    "tms_server/placement": {"tms_schemas", "tms_server/placement", "numpy", "numba", "pydantic"},
+    "tms_migrations": {"tms_server", "alembic", "sqlalchemy"},
+}
+
+
+def sources() -> Iterator[tuple[str, Path]]:
+    for folder in ("schemas", "client", "agents", "server", "migrations"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            yield path.relative_to(ROOT / folder).as_posix(), path
+
+
+@pytest.mark.parametrize(("name", "path"), [pytest.param(name, path, id=name) for name, path in sources()])
+def test_imports_follow_the_arrows(name: str, path: Path) -> None:
+    room = max((prefix for prefix in ALLOWED if name.startswith(prefix + "/")), key=len)
+    allowed = ALLOWED[room] if "/" in room else ALLOWED[room] | {room}
+    for line, module in imports(path):
+        top = module.split(".")[0]
+        if top in sys.stdlib_module_names:
+            continue
+        inside = module.replace(".", "/")
+        assert any(inside == name or inside.startswith(name + "/") for name in allowed), (
+            f"{name}:{line} imports {module}; {room} may import {sorted(allowed)}"
+        )
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: write imports in full"
+            yield node.lineno, node.module or ""
+
+
+def test_no_clock_or_generator_is_global() -> None:
+    """Time and randomness are parameters; only the system clock itself reads the clock."""
+    forbidden = {"datetime.now", "datetime.utcnow", "time.time", "random.random", "random.choice", "random.seed"}
+    exempt = {"tms_server/clock.py"}
+    for name, path in sources():
+        if name in exempt:
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in forbidden:
+                pytest.fail(f"{name}:{node.lineno} calls {ast.unparse(node.func)}: take a clock or a generator")
+
+
+def test_secrets_are_compared_in_constant_time() -> None:
+    """No ``==`` on a digest, secret or key."""
+    for name, path in sources():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Compare) and any(isinstance(op, ast.Eq | ast.NotEq) for op in node.ops):
+                text = ast.unparse(node).lower()
+                assert "digest" not in text and "secret" not in text, f"{name}:{node.lineno}: use hmac.compare_digest"
