@@ -47,14 +47,14 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str
     """An empty database of each kind."""
     if request.param == "sqlite":
         yield f"sqlite+aiosqlite:///{tmp_path / 'tms.sqlite'}"
-        return
-    maintenance = request.getfixturevalue("postgres_server")
-    name = f"t{uuid.uuid4().hex}"
-    asyncio.run(_execute(maintenance, f"create database {name}"))
-    try:
-        yield _asyncpg_url(maintenance, name)
-    finally:
-        asyncio.run(_execute(maintenance, f"drop database {name} with (force)"))
+    else:
+        yield from _database(request.getfixturevalue("postgres_server"))
+
+
+@pytest.fixture(scope="module")
+def module_postgres_url(postgres_server: str) -> Iterator[str]:
+    """An empty PostgreSQL database for all tests of a module."""
+    yield from _database(postgres_server)
 
 
 @pytest.fixture
@@ -99,6 +99,15 @@ class running:
 
     async def __aexit__(self, *error: object) -> None:
         await self._context.__aexit__(*error)  # type: ignore[arg-type]
+
+
+def _database(maintenance: str) -> Iterator[str]:
+    name = f"t{uuid.uuid4().hex}"
+    asyncio.run(_execute(maintenance, f"create database {name}"))
+    try:
+        yield _asyncpg_url(maintenance, name)
+    finally:
+        asyncio.run(_execute(maintenance, f"drop database {name} with (force)"))
 
 
 async def _execute(url: str, statement: str) -> None:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from tms_client.cli import CommandError
+from tms_client.cli import ArgumentParser, CommandError
 from tms_server.compiled import use_compiled_cache
 from tms_server.settings import Settings
 
 
 def main(argv: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(prog="tms serve", description="Run the TMS server.")
+    parser = ArgumentParser(prog="tms serve", description="Run the TMS server.")
     parser.add_argument("--host", help="address to bind (default 127.0.0.1)")
     parser.add_argument("--port", type=int, help="port (default 8080; 0 picks a free one)")
     parser.add_argument("--data-dir", type=Path, help="where the embedded database and compiled code live")
