@@ -1,0 +1,245 @@
+"""``Town``: the blocking client. ``AsyncTown`` in ``aio`` has the same methods, awaited.
+
+with Town("http://town.local:8080", key="...") as town:
+    print(town.where("tea bottle").best)
+"""
+
+from __future__ import annotations
+
+import ssl
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from datetime import datetime
+from typing import Any, TypeVar
+
+import httpx
+
+from tms_client import lookup
+from tms_client.answers import Location
+from tms_client.api import Api, Area
+from tms_client.connection import Connection, client_options
+from tms_client.delivery import Pace
+from tms_client.flows import Flow, Retry
+from tms_client.live import Endpoint, LiveFrame, follow, subscription
+from tms_client.posting import Poster
+from tms_client.spool import Spool
+from tms_schemas.agents import AgentView
+from tms_schemas.belief import AnomaliesAnswer, LabelsAnswer, MoversAnswer, PlacementsAnswer
+from tms_schemas.objects import (
+    CatalogueImport,
+    IntakeResult,
+    ObjectFields,
+    ObjectModel,
+    Product,
+    ProductIn,
+    TownObject,
+    UnknownTag,
+)
+from tms_schemas.observation import BatchAccepted, ObservationBatch
+from tms_schemas.rooms import Room, RoomIn
+
+T = TypeVar("T")
+
+
+class Town:
+    """A connection to one server. Safe to share between threads; close it, or use it as a context manager.
+
+    Every method raises ``TownError`` (see ``errors``): ``Unreachable`` and ``Busy`` only after the retries.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        key: str | None = None,
+        *,
+        timeout_s: float = 10.0,
+        retry: Retry | None = None,
+        verify: ssl.SSLContext | bool = True,
+        transport: httpx.BaseTransport | None = None,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> None:
+        self._retry = retry or Retry()
+        self._http = httpx.Client(transport=transport, **client_options(url, key, timeout_s, verify))
+        self._connection = Connection(self._http, sleep)
+        self._api = Api(self._retry)
+        self._endpoint = Endpoint(url, key, verify, timeout_s)
+        self.objects = Objects(self._connection, self._api)
+        self.products = Products(self._connection, self._api)
+        self.rooms = Rooms(self._connection, self._api)
+        self.agents = Agents(self._connection, self._api)
+
+    def close(self) -> None:
+        self._http.close()
+
+    def __enter__(self) -> Town:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def where(self, name: str, *, at: datetime | None = None) -> Location:
+        """Where the object with this tag, name or synonym probably is (now, or at ``at``).
+
+        Raises:
+            Ambiguous, NotFound: several objects fit equally well, or none; the message names the candidates.
+        """
+        return self._run(lookup.where(self._api, name, at))
+
+    def intake(
+        self,
+        tag: str,
+        *,
+        jan: str | None = None,
+        name: str | None = None,
+        room: str | None = None,
+        synonyms: Sequence[str] = (),
+    ) -> IntakeResult:
+        """Register an object in one call: tag and JAN, an SGTIN-96 EPC alone, or tag and name."""
+        return self._run(self._api.intake(tag, jan=jan, name=name, room=room, synonyms=synonyms))
+
+    def unknown_tags(self, room: str | None = None) -> Iterator[UnknownTag]:
+        """Tags that were seen but are not registered."""
+        cursor: str | None = None
+        while True:
+            page = self._run(self._api.unknown_tags(room, cursor=cursor))
+            yield from page.items
+            if (cursor := page.next_cursor) is None:
+                return
+
+    def placements(self, room: str, *, at: datetime | None = None) -> PlacementsAnswer:
+        """All pies of a room."""
+        return self._run(self._api.placements(room, at))
+
+    def labels(self, room: str, *, at: datetime | None = None) -> LabelsAnswer:
+        return self._run(self._api.labels(room, at))
+
+    def movers(self, room: str, *, at: datetime | None = None) -> MoversAnswer:
+        return self._run(self._api.movers(room, at))
+
+    def anomalies(self, room: str, *, at: datetime | None = None) -> AnomaliesAnswer:
+        return self._run(self._api.anomalies(room, at))
+
+    def post(self, batch: ObservationBatch) -> BatchAccepted:
+        """Post numbered observations at once, without a spool; returns when they are durable on the server."""
+        return self._run(self._api.post(batch))
+
+    def poster(self, spool: Spool, room: str, *, pace: Pace | None = None, retry: Retry | None = None) -> Poster:
+        """A poster that sends what the spool holds, through this connection."""
+        return Poster(self._http, spool, room, pace=pace, retry=retry)
+
+    def live(
+        self,
+        room: str,
+        *,
+        objects: Sequence[str] = (),
+        events: Sequence[str] = (),
+        min_change: float = 0.0,
+        with_events: bool = True,
+        cursor: int | None = None,
+    ) -> Generator[LiveFrame, None, None]:
+        """Snapshot, then events and states as they come; reconnects by itself and continues without loss."""
+        wanted = subscription(
+            room,
+            self._retry,
+            objects=objects,
+            events=events,
+            min_change=min_change,
+            with_events=with_events,
+            cursor=cursor,
+        )
+        return follow(self._endpoint, wanted)
+
+    def _run(self, flow: Flow[T]) -> T:
+        return self._connection.run(flow)
+
+
+class _Part:
+    def __init__(self, connection: Connection, api: Api) -> None:
+        self._connection, self._api = connection, api
+
+    def _run(self, flow: Flow[T]) -> T:
+        return self._connection.run(flow)
+
+
+class Objects(_Part):
+    """The object database."""
+
+    def get(self, tag: str) -> TownObject:
+        return self._run(self._api.get_object(tag))
+
+    def put(self, tag: str, fields: ObjectFields) -> TownObject:
+        return self._run(self._api.put_object(tag, fields))
+
+    def patch(self, tag: str, **changes: Any) -> TownObject:
+        """Change the named fields; None clears one."""
+        return self._run(self._api.patch_object(tag, changes))
+
+    def delete(self, tag: str) -> None:
+        self._run(self._api.delete_object(tag))
+
+    def model(self, tag: str) -> ObjectModel:
+        """Geometry for mapping."""
+        return self._run(self._api.object_model(tag))
+
+    def search(
+        self,
+        q: str | None = None,
+        *,
+        room: str | None = None,
+        area: Area | None = None,
+        category: str | None = None,
+        limit: int | None = None,
+    ) -> Iterator[TownObject]:
+        """All objects that fit, page by page (``limit`` per page): text, room, area (x0, y0, x1, y1 in metres)."""
+        cursor: str | None = None
+        while True:
+            page = self._run(
+                self._api.objects(q=q, room=room, area=area, category=category, limit=limit, cursor=cursor)
+            )
+            yield from page.items
+            if (cursor := page.next_cursor) is None:
+                return
+
+
+class Products(_Part):
+    """The product catalogue, by JAN/EAN/GTIN."""
+
+    def get(self, jan: str) -> Product:
+        return self._run(self._api.product(jan))
+
+    def put(self, jan: str, product: ProductIn) -> Product:
+        return self._run(self._api.put_product(jan, product))
+
+    def import_csv(self, csv: str | bytes) -> CatalogueImport:
+        """Import a catalogue; rows that cannot be taken are named in the answer."""
+        return self._run(self._api.import_catalogue(csv))
+
+
+class Rooms(_Part):
+    def get(self, room: str) -> Room:
+        return self._run(self._api.room(room))
+
+    def put(self, room: str, fields: RoomIn) -> Room:
+        return self._run(self._api.put_room(room, fields))
+
+    def list(self) -> Iterator[Room]:
+        cursor: str | None = None
+        while True:
+            page = self._run(self._api.rooms(cursor=cursor))
+            yield from page.items
+            if (cursor := page.next_cursor) is None:
+                return
+
+
+class Agents(_Part):
+    def get(self, agent: str) -> AgentView:
+        return self._run(self._api.agent(agent))
+
+    def list(self) -> Iterator[AgentView]:
+        """Who is alive, since when, how late."""
+        cursor: str | None = None
+        while True:
+            page = self._run(self._api.agents(cursor=cursor))
+            yield from page.items
+            if (cursor := page.next_cursor) is None:
+                return
