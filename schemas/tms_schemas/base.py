@@ -28,10 +28,8 @@ AgentId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{
 #: In scenario files any name; on the wire ``agent/n`` (checked by the batch, which knows the agent).
 LabelId = Annotated[str, StringConstraints(min_length=1, max_length=129, pattern=r"^[^\x00-\x1f]+$")]
 #: JAN / EAN / GTIN digits; the server verifies the check digit.
-Jan = Annotated[str, StringConstraints(pattern=r"^(\d{8}|\d{12,14})$")]
-Name = Annotated[
-    str, StringConstraints(min_length=1, max_length=200, strip_whitespace=True, pattern=r"^[^\x00]+$")
-]
+Jan = Annotated[str, StringConstraints(pattern=r"^([0-9]{8}|[0-9]{12,14})$")]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=200, strip_whitespace=True, pattern=r"^[^\x00]+$")]
 
 #: Metres in the room frame. The bound keeps squared distances finite.
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]

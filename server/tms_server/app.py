@@ -17,6 +17,8 @@ from tms_server.db.lock import own_database
 from tms_server.db.migrate import migrate
 from tms_server.db.session import Sessions
 from tms_server.ingest.endpoints import router as ingest_router
+from tms_server.keys.endpoints import router as keys_router
+from tms_server.keys.ring import KeyRing
 from tms_server.limits import BodyLimit
 from tms_server.live.endpoints import router as live_router
 from tms_server.objects.endpoints import router as objects_router
@@ -34,6 +36,7 @@ class State(TypedDict):
     clock: Clock
     engine: AsyncEngine
     sessions: Sessions
+    keys: KeyRing
     town: Town
 
 
@@ -50,14 +53,21 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
                 await migrate(engine)
                 sessions = Sessions(engine)
                 async with open_town(engine, sessions, settings, clock) as town:
-                    yield State(settings=settings, clock=clock, engine=engine, sessions=sessions, town=town)
+                    yield State(
+                        settings=settings,
+                        clock=clock,
+                        engine=engine,
+                        sessions=sessions,
+                        keys=KeyRing(sessions),
+                        town=town,
+                    )
         finally:
             await engine.dispose()
 
     app = FastAPI(title="Town Management System", version="1", lifespan=lifespan, docs_url=None, redoc_url=None)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
     problems.install(app)
-    for router in (ingest_router, objects_router, rooms_router, town_router, agents_router):
+    for router in (keys_router, ingest_router, objects_router, rooms_router, town_router, agents_router):
         app.include_router(router, prefix="/v1", responses=problems.COMMON_RESPONSES)
     app.include_router(live_router, prefix="/v1")
     app.include_router(health.router)
