@@ -1,0 +1,482 @@
+"""The hot loops of the belief engine on plain arrays, compiled by numba.
+
+Shapes: H hypotheses, K objects in play (columns), N objects, S label slots, C children of an event.
+
+    rows    int32 [H, K]   slot of each object in play, per hypothesis
+    w       float64 [H]    weight, sums to 1
+    zob     uint64 [H]     incremental Zobrist-like hash of the placement
+    cols    int32 [K]      object of each column
+    pinned  int32 [N]      slot of each object that is certain; -1 while it is in play
+
+A *child* is a hypothesis after the event, written as its parent row with at most one object moved: (parent, obj,
+to, weight, hash), obj = -1 where nothing moved. Children are merged and thinned before any row is copied.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+I32 = np.int32
+U64 = np.uint64
+_GOLDEN = U64(0x9E3779B97F4A7C15)
+_MIX1 = U64(0xBF58476D1CE4E5B9)
+_MIX2 = U64(0x94D049BB133111EB)
+
+
+@njit(cache=True)
+def zobrist(obj: int, slot: int) -> Any:
+    """The hash of "object at slot": splitmix64 of the pair, so that no table is needed."""
+    z = (U64(obj) << U64(32)) ^ U64(slot)
+    z = z * _GOLDEN + _GOLDEN
+    z = (z ^ (z >> U64(30))) * _MIX1
+    z = (z ^ (z >> U64(27))) * _MIX2
+    return z ^ (z >> U64(31))
+
+
+@njit(cache=True)
+def content_likelihoods(
+    weight_g: Any, weight_sd: Any, size_m: Any, p_read: Any, tagged: Any,
+    read: int, alpha: float, n_tags: int, grams: float, sd_g: float, range_g: float,
+    width: float, sd_m: float, range_m: float,
+) -> Any:  # fmt: skip
+    """Likelihood of a reading given what is at the label: [N + 1], the last for EMPTY.
+
+    ``read``: index of the object whose tag was read, -1 reader saw nothing, -2 no reader. ``grams`` and ``width``
+    are NaN where not measured. Registered weight (g) and size (m) are NaN where unknown.
+    """
+    n = p_read.shape[0]
+    out = np.ones(n + 1)
+    for i in range(n + 1):
+        empty = i == n
+        f = 1.0
+        if read >= 0:
+            if empty:
+                f = (1.0 - alpha) / n_tags
+            elif not tagged[i]:
+                f = 0.0
+            elif i == read:
+                f = p_read[i] * alpha
+            else:
+                f = p_read[i] * (1.0 - alpha) / max(n_tags - 1, 1)
+        elif read == -1:
+            if empty:
+                f = alpha
+            elif tagged[i]:
+                f = 1.0 - p_read[i]
+        if not math.isnan(grams):
+            if empty or math.isnan(weight_g[i]):
+                f *= 1.0 / range_g
+            else:
+                v = sd_g * sd_g + weight_sd[i] * weight_sd[i]
+                d = grams - weight_g[i]
+                f *= math.exp(-0.5 * d * d / v) / math.sqrt(2.0 * math.pi * v)
+        if not math.isnan(width):
+            if empty or math.isnan(size_m[i]):
+                f *= 1.0 / range_m
+            else:
+                v = sd_m * sd_m
+                d = width - size_m[i]
+                f *= math.exp(-0.5 * d * d / v) / math.sqrt(2.0 * math.pi * v)
+        out[i] = f
+    return out
+
+
+@njit(cache=True)
+def give(
+    rows: Any, w: Any, zob: Any, cols: Any,
+    cand_of: Any, logk: Any, near: Any, dest: Any, n_pinned: Any, pin_obj: Any, pin_slot: Any,
+    holding: bool, u: float, stay: float, idle_to_stay: bool,
+    p_jump: float, jumpable: Any, jump_obj: Any, jump_slot: Any, lik: Any,
+) -> Any:  # fmt: skip
+    """Children of "somebody gave one of the things he holds": appear and hand-over.
+
+    cand_of [S]: candidate index of a slot or -1. logk [Q]: log kernel of each candidate. near [Q]: within the gate (or
+    not subject to it). dest [Q]: where a thing of that candidate goes. n_pinned [Q], pin_obj, pin_slot: certain objects at
+    candidates. ``u`` mass of the giving, ``stay`` mass of nothing moving; an empty-handed candidate's mass is lost, or
+    joins ``stay`` if ``idle_to_stay``. Jump: a thing at a ``jumpable`` slot, or one of jump_obj, goes to dest[0].
+    lik [N + 1]: likelihood of the content of the label after the event.
+
+    Returns (parent, obj, to, weight, hash, count).
+    """
+    n_h, n_k = rows.shape
+    n_q = logk.shape[0]
+    n_jump_pinned = jump_obj.shape[0] if p_jump > 0.0 else 0
+    room = n_h * (1 + n_k + pin_obj.shape[0] + n_jump_pinned)
+    parent = np.empty(room, I32)
+    obj = np.empty(room, I32)
+    to = np.empty(room, I32)
+    cw = np.empty(room)
+    cz = np.empty(room, U64)
+    empty = lik[lik.shape[0] - 1]
+    p = np.zeros(n_q)
+    held = np.zeros(n_q, np.int64)
+    if not holding and n_q > 0:
+        _normalise(logk, near, held, False, p)
+    n = 0
+    for h in range(n_h):
+        wh = w[h]
+        zh = zob[h]
+        for q in range(n_q):
+            held[q] = n_pinned[q]
+        n_jump = n_jump_pinned
+        for k in range(n_k):
+            slot = rows[h, k]
+            q = cand_of[slot]
+            if q >= 0:
+                held[q] += 1
+            elif jumpable[slot]:
+                n_jump += 1
+        still = stay
+        if n_q == 0:
+            still += u
+        elif holding and not _normalise(logk, near, held, True, p):
+            still += u
+        if idle_to_stay:
+            for q in range(n_q):
+                if held[q] == 0:
+                    still += u * p[q]
+        if p_jump > 0.0 and n_jump == 0:
+            still += p_jump
+        m = wh * still * empty
+        if m > 0.0:
+            parent[n], obj[n], to[n], cw[n], cz[n] = h, -1, -1, m, zh
+            n += 1
+        for k in range(n_k):
+            slot = rows[h, k]
+            q = cand_of[slot]
+            i = cols[k]
+            if q >= 0:
+                m = wh * u * p[q] / held[q] * lik[i]
+                d = dest[q]
+            elif p_jump > 0.0 and jumpable[slot]:
+                m = wh * p_jump / n_jump * lik[i]
+                d = dest[0]
+            else:
+                continue
+            if m > 0.0:
+                parent[n], obj[n], to[n], cw[n] = h, i, d, m
+                cz[n] = zh ^ zobrist(i, slot) ^ zobrist(i, d)
+                n += 1
+        for j in range(pin_obj.shape[0]):
+            i = pin_obj[j]
+            q = cand_of[pin_slot[j]]
+            m = wh * u * p[q] / held[q] * lik[i]
+            if m > 0.0:
+                parent[n], obj[n], to[n], cw[n] = h, i, dest[q], m
+                cz[n] = zh ^ zobrist(i, pin_slot[j]) ^ zobrist(i, dest[q])
+                n += 1
+        for j in range(n_jump_pinned):
+            i = jump_obj[j]
+            m = wh * p_jump / n_jump * lik[i]
+            if m > 0.0:
+                parent[n], obj[n], to[n], cw[n] = h, i, dest[0], m
+                cz[n] = zh ^ zobrist(i, jump_slot[j]) ^ zobrist(i, dest[0])
+                n += 1
+    return parent, obj, to, cw, cz, n
+
+
+@njit(cache=True)
+def _normalise(logk: Any, near: Any, held: Any, only_held: bool, p: Any) -> bool:
+    """p [Q] := kernel over the (feasible) candidates, zero beyond the gate unless nobody is inside it."""
+    inside = False
+    top = -np.inf
+    for q in range(logk.shape[0]):
+        # near: 1 mover inside the gate, 0 mover outside, 2 ghost (no gate)
+        if (not only_held or held[q] > 0) and near[q] == 1:
+            inside = True
+    for q in range(logk.shape[0]):
+        p[q] = 0.0
+        if (not only_held or held[q] > 0) and (near[q] != 0 or not inside):
+            p[q] = 1.0
+            top = max(top, logk[q])
+    if top == -np.inf:
+        p[:] = 0.0
+        return False
+    total = 0.0
+    for q in range(logk.shape[0]):
+        if p[q] > 0.0:
+            p[q] = math.exp(logk[q] - top)
+            total += p[q]
+    for q in range(logk.shape[0]):
+        p[q] /= total
+    return True
+
+
+@njit(cache=True)
+def spread(
+    rows: Any, w: Any, zob: Any, cols: Any,
+    src: int, only: int, pin_obj: int, pin_slot: int, dest: Any, p_dest: Any, p_stay: float, lik: Any,
+) -> Any:  # fmt: skip
+    """Children of "the object at ``src`` went somewhere": vanish and enter; with no dest, a mere reading.
+
+    ``only`` >= 0 looks at that object alone; pin_obj >= 0: the (certain) object in question, at pin_slot. lik [N + 1]
+    weighs the content before the event. Returns (parent, obj, to, weight, hash, count).
+    """
+    n_h, n_k = rows.shape
+    room = n_h * (1 + dest.shape[0])
+    parent = np.empty(room, I32)
+    obj = np.empty(room, I32)
+    to = np.empty(room, I32)
+    cw = np.empty(room)
+    cz = np.empty(room, U64)
+    n = 0
+    for h in range(n_h):
+        i = pin_obj
+        slot = pin_slot
+        if pin_obj < 0:
+            for k in range(n_k):
+                if rows[h, k] == src and (only < 0 or cols[k] == only):
+                    i = cols[k]
+                    slot = src
+                    break
+        if i < 0:
+            m = w[h] * lik[lik.shape[0] - 1]
+            if m > 0.0:
+                parent[n], obj[n], to[n], cw[n], cz[n] = h, -1, -1, m, zob[h]
+                n += 1
+            continue
+        base = w[h] * lik[i]
+        m = base * p_stay
+        if m > 0.0:
+            parent[n], obj[n], to[n], cw[n], cz[n] = h, -1, -1, m, zob[h]
+            n += 1
+        for q in range(dest.shape[0]):
+            m = base * p_dest[q]
+            if m > 0.0:
+                parent[n], obj[n], to[n], cw[n] = h, i, dest[q], m
+                cz[n] = zob[h] ^ zobrist(i, slot) ^ zobrist(i, dest[q])
+                n += 1
+    return parent, obj, to, cw, cz, n
+
+
+@njit(cache=True)
+def relabel(rows: Any, zob: Any, cols: Any, remap: Any) -> Any:
+    """Rows with every slot s replaced by remap[s], and their hashes."""
+    out = np.empty_like(rows)
+    z = zob.copy()
+    for h in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            s = rows[h, k]
+            t = remap[s]
+            out[h, k] = t
+            if t != s:
+                z[h] ^= zobrist(cols[k], s) ^ zobrist(cols[k], t)
+    return out, z
+
+
+@njit(cache=True)
+def hashes(rows: Any, cols: Any) -> Any:
+    """Hash of every row from scratch."""
+    z = np.zeros(rows.shape[0], U64)
+    for h in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            z[h] ^= zobrist(cols[k], rows[h, k])
+    return z
+
+
+@njit(cache=True)
+def merge(
+    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, cw: Any, cz: Any, n: int
+) -> int:
+    """Add up the weights of children with the same placement, in place; the first one stands. Returns their number."""
+    size = 16
+    while size < 2 * n:
+        size *= 2
+    mask = U64(size - 1)
+    table = np.full(size, -1, I32)
+    kept = 0
+    for c in range(n):
+        at = np.int64((cz[c] ^ (cz[c] >> U64(32))) & mask)
+        while True:
+            other = table[at]
+            if other < 0:
+                table[at] = kept
+                if kept != c:
+                    parent[kept], obj[kept], to[kept] = parent[c], obj[c], to[c]
+                    cw[kept], cz[kept] = cw[c], cz[c]
+                kept += 1
+                break
+            if cz[other] == cz[c] and _same(rows, cols, col_of, pinned, parent, obj, to, other, c):
+                cw[other] += cw[c]
+                break
+            at = (at + 1) & np.int64(mask)
+    return kept
+
+
+@njit(cache=True)
+def _same(
+    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, a: int, b: int
+) -> bool:
+    """Whether two children are the same placement, object by object."""
+    oa, ob = obj[a], obj[b]
+    for k in range(cols.shape[0]):
+        i = cols[k]
+        va = to[a] if oa == i else rows[parent[a], k]
+        vb = to[b] if ob == i else rows[parent[b], k]
+        if va != vb:
+            return False
+    if oa >= 0 and col_of[oa] < 0 and to[a] != (to[b] if ob == oa else pinned[oa]):
+        return False
+    return not (ob >= 0 and col_of[ob] < 0 and to[b] != (to[a] if oa == ob else pinned[ob]))
+
+
+@njit(cache=True)
+def child_marginals(
+    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, cw: Any, slots: int
+) -> Any:
+    """Marginals of the objects in play over the children: [K, S]. Objects that leave a pinned place are not in it."""
+    by_parent = np.zeros(rows.shape[0])
+    for c in range(parent.shape[0]):
+        by_parent[parent[c]] += cw[c]
+    p = np.zeros((cols.shape[0], slots))
+    for h in range(rows.shape[0]):
+        if by_parent[h] > 0.0:
+            for k in range(cols.shape[0]):
+                p[k, rows[h, k]] += by_parent[h]
+    for c in range(parent.shape[0]):
+        if obj[c] >= 0:
+            k = col_of[obj[c]]
+            if k >= 0:
+                p[k, rows[parent[c], k]] -= cw[c]
+                p[k, to[c]] += cw[c]
+    return p
+
+
+@njit(cache=True)
+def build(
+    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any
+) -> Any:
+    """Write the children out as rows; objects that became certain leave play, those that are not any more enter it.
+
+    Updates col_of and pinned. Returns (rows, cols, touched): columns are in the order of the objects; touched are the
+    objects that were in play or moved.
+    """
+    n = parent.shape[0]
+    n_k = cols.shape[0]
+    most = n_k
+    for c in range(n):
+        i = obj[c]
+        if i >= 0 and col_of[i] == -1:
+            col_of[i] = -2
+            most += 1
+    entering = np.empty(most, I32)
+    m = 0
+    for k in range(n_k):
+        entering[m] = cols[k]
+        m += 1
+    for c in range(n):
+        i = obj[c]
+        if i >= 0 and col_of[i] == -2:
+            col_of[i] = -3
+            entering[m] = i
+            m += 1
+    entering.sort()
+    source = np.empty(most, I32)
+    for k in range(most):
+        source[k] = col_of[entering[k]]
+    for k in range(most):
+        col_of[entering[k]] = k
+    # Copy column-wise only what is certain to be needed: first find the columns that vary.
+    full = np.empty((n, most), I32)
+    for c in range(n):
+        h = parent[c]
+        for k in range(most):
+            s = source[k]
+            full[c, k] = rows[h, s] if s >= 0 else pinned[entering[k]]
+        if obj[c] >= 0:
+            full[c, col_of[obj[c]]] = to[c]
+    varies = np.zeros(most, np.bool_)
+    left = most
+    for c in range(1, n):
+        if left == 0:
+            break
+        for k in range(most):
+            if not varies[k] and full[c, k] != full[0, k]:
+                varies[k] = True
+                left -= 1
+    kept = most - left
+    new_cols = np.empty(kept, I32)
+    m = 0
+    for k in range(most):
+        i = entering[k]
+        if varies[k]:
+            new_cols[m] = i
+            col_of[i] = m
+            pinned[i] = -1
+            m += 1
+        else:
+            col_of[i] = -1
+            pinned[i] = full[0, k]
+    if kept == most:
+        return full, new_cols, entering
+    out = np.empty((n, kept), I32)
+    for c in range(n):
+        m = 0
+        for k in range(most):
+            if varies[k]:
+                out[c, m] = full[c, k]
+                m += 1
+    return out, new_cols, entering
+
+
+@njit(cache=True)
+def marginals(rows: Any, w: Any, slots: int) -> Any:
+    """Probability of every slot for every object in play: [K, S]."""
+    p = np.zeros((rows.shape[1], slots))
+    for h in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            p[k, rows[h, k]] += w[h]
+    return p
+
+
+@njit(cache=True)
+def threshold(cw: Any, budget: int) -> float:
+    """Fearnhead and Clifford's c: sum of min(w / c, 1) = budget. Weights above c are kept as they are."""
+    rest = cw.sum()
+    c = rest / budget
+    kept = -1
+    while True:
+        rest = 0.0
+        above = 0
+        for i in range(cw.shape[0]):
+            if cw[i] > c:
+                above += 1
+            else:
+                rest += cw[i]
+        if above == kept or above >= budget:
+            return c
+        kept = above
+        c = rest / (budget - above)
+
+
+@njit(cache=True)
+def thin(cw: Any, c: float, u: float, budget: int) -> Any:
+    """Keep weights above c; of the others one per c of their cumulated weight, starting at u * c, at weight c.
+
+    Returns indices [<= budget] in order and sets their weights in ``cw``.
+    """
+    room = budget
+    for i in range(cw.shape[0]):
+        if cw[i] > c:
+            room -= 1
+    keep = np.empty(budget, I32)
+    n = 0
+    point = u * c
+    total = 0.0
+    for i in range(cw.shape[0]):
+        if cw[i] > c:
+            keep[n] = i
+            n += 1
+        else:
+            total += cw[i]
+            if total > point and room > 0:
+                room -= 1
+                point += c
+                cw[i] = c
+                keep[n] = i
+                n += 1
+    return keep[:n]

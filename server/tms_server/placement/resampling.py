@@ -1,0 +1,59 @@
+"""Keeping the set within its budget: Fearnhead-Clifford optimal resampling, and pruning with a certificate.
+
+Fearnhead, Clifford: On-line inference for hidden Markov models via particle filters, JRSS B 65 (2003).
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from tms_server.placement import kernels
+from tms_server.placement.specs import DrawKey
+from tms_server.placement.state import Array, Children, Hypotheses
+
+
+def generator(key: DrawKey) -> np.random.Generator:
+    """The random draws that belong to one event: Philox keyed by a hash of (seed, agent, seq)."""
+    name = f"{key.seed}\x00{key.agent}\x00{key.seq}".encode()
+    digest = hashlib.blake2b(name, digest_size=16).digest()
+    return np.random.Generator(np.random.Philox(key=np.frombuffer(digest, "<u8").astype(np.uint64)))
+
+
+class Budget:
+    """Thins the children of one event to ``most``; random numbers are drawn only if that is needed."""
+
+    def __init__(self, most: int, key: DrawKey, belief: Hypotheses) -> None:
+        self._most, self._key, self._belief = most, key, belief
+        self._rng: np.random.Generator | None = None
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether the set had to be thinned."""
+        return self._rng is not None
+
+    def __call__(self, w: Array, children: Children) -> tuple[Array, Array] | None:
+        """Which of the normalised children to keep, and their new weights; None keeps all."""
+        if w.size <= self._most:
+            return None
+        if self._rng is None:
+            self._rng = generator(self._key)
+        c = kernels.threshold(w, self._most)
+        keep = kernels.thin(w, c, self._rng.random(), self._most)
+        kept = w[keep]
+        return keep, kept / kept.sum()
+
+
+def light(w: Array, eps: float) -> tuple[Array, float]:
+    """Indices that stay when the lightest weights go while their sum is <= eps, and the mass dropped."""
+    candidates = np.flatnonzero(w <= eps)
+    if candidates.size:
+        candidates = candidates[np.argsort(w[candidates], kind="stable")]
+        total = np.cumsum(w[candidates])
+        n = int(np.searchsorted(total, eps, side="right"))
+        if n:
+            keep = np.ones(w.size, np.bool_)
+            keep[candidates[:n]] = False
+            return np.flatnonzero(keep), float(total[n - 1])
+    return np.arange(w.size), 0.0

@@ -1,0 +1,121 @@
+"""The weighted set of distinct hypotheses, and how the children of an event become the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tms_server.placement import kernels
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class Children(NamedTuple):
+    """Hypotheses after an event as (parent row, object moved or -1, where to, mass, hash); see ``kernels``."""
+
+    parent: Array
+    obj: Array
+    to: Array
+    mass: Array
+    zob: Array
+
+
+class Hypotheses:
+    """Placements with weights. Only objects in play have a column; the others are pinned to one slot.
+
+    ``rows`` int32 [H, K], ``w`` float64 [H] (sum 1), ``zob`` uint64 [H] (relative: equal placements have equal hashes),
+    ``cols`` int32 [K] (object of each column, ascending), ``pinned`` int32 [N] (slot, -1 in play), ``col_of`` int32 [N].
+    """
+
+    def __init__(self, rows: Array, w: Array, cols: Array, pinned: Array) -> None:
+        self.rows, self.w, self.cols, self.pinned = rows, w, cols, pinned
+        self.col_of = np.full(pinned.size, -1, np.int32)
+        self.col_of[cols] = np.arange(cols.size, dtype=np.int32)
+        self.zob: Array = kernels.hashes(rows, cols)
+        self._marginals: Array | None = None
+
+    @classmethod
+    def certain(cls, pinned: Array) -> Hypotheses:
+        """One hypothesis: every object is where ``pinned`` says."""
+        return cls(np.empty((1, 0), np.int32), np.ones(1), np.empty(0, np.int32), pinned)
+
+    def copy(self) -> Hypotheses:
+        """Independent of this one; arrays that are never written in place are shared."""
+        twin = Hypotheses.__new__(Hypotheses)
+        twin.rows, twin.w, twin.zob, twin.cols = self.rows, self.w, self.zob, self.cols
+        twin.pinned, twin.col_of, twin._marginals = self.pinned.copy(), self.col_of.copy(), self._marginals
+        return twin
+
+    def __len__(self) -> int:
+        return int(self.w.size)
+
+    def marginals(self, slots: int) -> Array:
+        """Probability of every slot for every object in play: [K, S]."""
+        if self._marginals is None or self._marginals.shape[1] < slots:
+            self._marginals = kernels.marginals(self.rows, self.w, slots)
+        return self._marginals
+
+    def column(self, obj: int) -> Array:
+        """The slot of one object under every hypothesis, [H]."""
+        k = self.col_of[obj]
+        return self.rows[:, k] if k >= 0 else np.full(self.w.size, self.pinned[obj], np.int32)
+
+    def holds(self, slot: int) -> bool:
+        """Whether any hypothesis has an object there."""
+        return bool((self.pinned == slot).any() or (self.rows == slot).any())
+
+    def settle(
+        self,
+        children: Children,
+        *,
+        merge: bool,
+        rows: Array | None = None,
+        limit: Callable[[Array, Children], tuple[Array, Array] | None] | None = None,
+    ) -> tuple[float, Array]:
+        """Make the children the new set.
+
+        ``rows``: what their parents index, if not the present rows. ``limit(masses, children)`` may answer which of
+        the (normalised) children to keep, and their weights.
+
+        Returns (total mass, objects that were in play or moved). A total of 0 leaves everything as it is.
+        """
+        rows = self.rows if rows is None else rows
+        parent, obj, to, mass, zob = children
+        n = parent.size
+        if merge and n > 1:
+            n = kernels.merge(rows, self.cols, self.col_of, self.pinned, parent, obj, to, mass, zob, n)
+            parent, obj, to, mass, zob = parent[:n], obj[:n], to[:n], mass[:n], zob[:n]
+        total = float(mass.sum())
+        if not total > 0.0:
+            return 0.0, np.empty(0, np.int32)
+        w = mass / total
+        chosen = None if limit is None else limit(w, Children(parent, obj, to, mass, zob))
+        if chosen is not None:
+            keep, w = chosen
+            parent, obj, to, zob = parent[keep], obj[keep], to[keep], zob[keep]
+        self.rows, self.cols, touched = kernels.build(
+            rows, self.cols, self.col_of, self.pinned, parent, obj, to
+        )
+        self.w, self.zob = w, zob
+        self._marginals = None
+        return total, touched
+
+    def unpin(self, objects: Array) -> None:
+        """Give certain objects a column, although they do not vary yet."""
+        order = np.concatenate([self.cols, objects.astype(np.int32)])
+        values = np.broadcast_to(self.pinned[objects], (self.w.size, objects.size))
+        rows = np.concatenate([self.rows, values.astype(np.int32)], axis=1)
+        by_object = np.argsort(order, kind="stable")
+        # The hash of the new columns is the same for every row, so that hashes stay comparable without it.
+        self.cols, self.rows = order[by_object], np.ascontiguousarray(rows[:, by_object])
+        self.pinned[objects] = -1
+        self.col_of[self.cols] = np.arange(self.cols.size, dtype=np.int32)
+        self._marginals = None
+
+    def everything(self) -> Children:
+        """The present set as children in which nothing moved."""
+        n = self.w.size
+        still = np.full(n, -1, np.int32)
+        return Children(np.arange(n, dtype=np.int32), still, still.copy(), self.w.copy(), self.zob.copy())
