@@ -10,8 +10,8 @@ from tms_schemas import events
 from tms_schemas.base import AgentId, LabelId, Model, Name, Pose, RoomId, Tag, UtcTime
 from tms_schemas.events import Kind, Placed
 
-#: Largest sequence number (signed 64 bit: both databases store it as such).
-MAX_SEQ = 2**63 - 1
+#: Largest sequence number: it and its successor fit the signed 64 bit integers of both databases.
+MAX_SEQ = 2**63 - 2
 MAX_BATCH = 1000
 
 

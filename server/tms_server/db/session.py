@@ -15,6 +15,10 @@ from tms_server.db.engine import WRITE
 ReadOnlySession = NewType("ReadOnlySession", AsyncSession)
 
 
+#: Key of ``session.info``: rooms whose log this unit of work appended to; their actors are told after the commit.
+CHANGED_ROOMS = "changed_rooms"
+
+
 class Sessions:
     """Makes the sessions of an engine."""
 
@@ -38,6 +42,8 @@ async def _write_session(connection: HTTPConnection) -> AsyncIterator[AsyncSessi
             await session.rollback()
             raise
         await session.commit()
+        for room in session.info.get(CHANGED_ROOMS, ()):
+            connection.state.town.poke(room)
 
 
 async def _read_session(connection: HTTPConnection) -> AsyncIterator[ReadOnlySession]:

@@ -98,6 +98,8 @@ class LogRow(Base):
     received_at: Mapped[int]
     kind: Mapped[str]
     body: Mapped[str]
+    #: Arrived after the retention window: kept, but no belief knows it.
+    late: Mapped[bool]
 
 
 class AgentRow(Base):

@@ -1,0 +1,123 @@
+"""What people and programs change in a room's registry is part of its log, beside the observations.
+
+``append_registry`` writes the record in the transaction that changes the table row, so that table and log agree.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
+from sqlalchemy import delete, func, insert, literal, select, update
+from sqlalchemy.ext.asyncio import AsyncSession
+
+from tms_schemas.base import Model, Tag
+from tms_schemas.rooms import RoomIn
+from tms_server.db.session import CHANGED_ROOMS
+from tms_server.db.tables import LogRow, RoomRow, UnknownTagRow
+from tms_server.db.times import to_us
+from tms_server.errors import NotFound
+from tms_server.log.record import REGISTRY_MARK
+
+REGISTRY = "registry"
+
+
+class TrackedObject(Model):
+    """All that the belief knows of an object. Weights in grams; ``size_m`` the width that a laser sees (metres)."""
+
+    tag: Tag
+    name: str
+    weight_g: float | None = None
+    weight_sd_g: float = 0.0
+    size_m: float | None = None
+
+
+class ObjectRegistered(TrackedObject):
+    """The room tracks the object from now on (or from before its tag was first seen as unknown)."""
+
+    type: Literal["object_registered"] = "object_registered"
+
+
+class ObjectChanged(TrackedObject):
+    """The whole new state of the object, not only what changed."""
+
+    type: Literal["object_changed"] = "object_changed"
+
+
+class ObjectRemoved(Model):
+    """The room tracks the object no more."""
+
+    type: Literal["object_removed"] = "object_removed"
+    tag: Tag
+
+
+class RoomChanged(Model):
+    """The room was made or changed; ``room`` is its whole new state."""
+
+    type: Literal["room_changed"] = "room_changed"
+    room: RoomIn
+
+
+RegistryBody = ObjectRegistered | ObjectChanged | ObjectRemoved | RoomChanged
+registry_body: TypeAdapter[RegistryBody] = TypeAdapter(Annotated[RegistryBody, Field(discriminator="type")])
+
+
+async def append_registry(session: AsyncSession, room: str, body: RegistryBody, *, now: datetime) -> None:
+    """Append one registry record to the log of ``room``, in the transaction of ``session`` (a writing one).
+
+    The row of the room must exist or be pending in the session. Its row stays locked until the commit, so a unit of
+    work that touches two rooms takes them in the order of their ids. A tag that is registered is unknown no more:
+    its row in ``unknown_tags`` goes.
+
+    Raises:
+        NotFound: there is no such room.
+    """
+    await session.flush()
+    head = await session.scalar(
+        update(RoomRow).where(RoomRow.room == room).values(head=RoomRow.head + 1).returning(RoomRow.head),
+        execution_options={"synchronize_session": False},
+    )
+    if head is None:
+        raise NotFound(f"there is no room {room!r}")
+    agent = REGISTRY_MARK + room
+    seq = await session.scalar(select(func.coalesce(func.max(LogRow.seq), 0) + 1).where(LogRow.agent == agent))
+    effective_at = await _newest(session, room, to_us(now))
+    if isinstance(body, ObjectRegistered):
+        this = (UnknownTagRow.room == room) & (UnknownTagRow.tag == body.tag)
+        first_seen = await session.scalar(select(UnknownTagRow.first_seen).where(this))
+        if first_seen is not None:
+            removed_at = await _removed(session, agent, body.tag)
+            effective_at = max(min(effective_at, first_seen - 1), removed_at)
+            await session.execute(
+                delete(UnknownTagRow).where(this), execution_options={"synchronize_session": "fetch"}
+            )
+    await session.execute(
+        insert(LogRow).values(
+            room=room,
+            offset=head,
+            agent=agent,
+            seq=seq,
+            observed_at=effective_at,
+            received_at=to_us(now),
+            kind=REGISTRY,
+            body=body.model_dump_json(exclude_none=True, by_alias=True),
+            late=False,
+        )
+    )
+    session.info.setdefault(CHANGED_ROOMS, set()).add(room)
+
+
+async def _newest(session: AsyncSession, room: str, now: int) -> int:
+    """From when a change counts: the room's newest observation, but never the future; 0 in an empty room."""
+    newest = await session.scalar(select(func.max(LogRow.observed_at)).where(LogRow.room == room))
+    return 0 if newest is None else min(newest, now)
+
+
+async def _removed(session: AsyncSession, agent: str, tag: str) -> int:
+    """When the room last stopped tracking ``tag`` (0 if never): it cannot be registered again before that."""
+    of_tag = literal(ObjectRemoved(tag=tag).model_dump_json(exclude_none=True, by_alias=True))
+    found = await session.scalar(
+        select(func.max(LogRow.observed_at)).where(LogRow.agent == agent, LogRow.body == of_tag)
+    )
+    return found or 0
