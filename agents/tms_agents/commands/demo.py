@@ -1,0 +1,56 @@
+"""``tms demo``: a server, a simulated room and its agents, playing the paper's experiment."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+
+from tms_agents.simulation.demo import Plan, run
+from tms_agents.simulation.terminal import Terminal
+from tms_client.cli import ArgumentParser, CommandError
+
+
+def main(argv: Sequence[str]) -> int:
+    parser = ArgumentParser(
+        prog="tms demo",
+        description="Play the paper's experiment: ten objects, three smart cabinets, a person and a robot.",
+    )
+    parser.add_argument("--once", action="store_true", help="leave after the story; exit status 1 if a pie is off")
+    parser.add_argument(
+        "--weights", action="store_true", help="register and measure weights: how much sooner they know"
+    )
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, help="room seconds per second (default 1: a story of 40 s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the sensors' noise (default 0)")
+    parser.add_argument("--url", help="use this running server instead of starting one")
+    parser.add_argument("--key", help="API key for --url (scope admin)")
+    parser.add_argument("--room", default="demo", help="id of the room (default demo)")
+    parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
+    parser.add_argument("--data-dir", type=Path, help="keep the server's data here (default: thrown away)")
+    arguments = parser.parse_args(argv)
+    if arguments.url and (arguments.port or arguments.data_dir):
+        raise CommandError("--port and --data-dir are for a server of our own, not with --url")
+    if arguments.seed < 0:
+        raise CommandError(f"--seed must not be negative, got {arguments.seed}")
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _leave)
+    try:
+        return 0 if run(Plan(**vars(arguments)), Terminal(sys.stdout)) else 1
+    except KeyboardInterrupt:
+        sys.stdout.write("\n")
+        return 0 if not arguments.once else 130
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0.05 <= speed <= 1000.0:
+        raise ValueError(text)
+    return speed

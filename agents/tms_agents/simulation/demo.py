@@ -1,0 +1,96 @@
+"""The demo: a server, the room registered in it, and the experiment played by agents over HTTP."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tms_agents.simulation import pies
+from tms_agents.simulation.catalogue import ITEMS
+from tms_agents.simulation.idle import afternoon
+from tms_agents.simulation.player import Player, posted
+from tms_agents.simulation.room import description, new_world
+from tms_agents.simulation.sensors import READ_S
+from tms_agents.simulation.service import server
+from tms_agents.simulation.story import MOVED, STEPS
+from tms_agents.simulation.terminal import Terminal
+from tms_client import Poster, Retry, Town, TownError
+from tms_client.cli import CommandError
+from tms_schemas.objects import ObjectFields, ProductIn
+
+DELIVERY_S = 60.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Plan:
+    """How to play: against ``url`` or a server of our own on ``port`` (0: a free one) with its data in ``data_dir``."""
+
+    url: str | None = None
+    key: str | None = None
+    room: str = "demo"
+    port: int = 0
+    data_dir: Path | None = None
+    weights: bool = False
+    once: bool = False
+    speed: float = 1.0
+    seed: int = 0
+
+
+def run(plan: Plan, terminal: Terminal) -> bool:
+    """Play the story; True where every pie was as expected. Goes on living until Ctrl-C unless ``plan.once``."""
+    with ExitStack() as stack:
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tms-demo-")))
+        url = plan.url or stack.enter_context(server(plan.data_dir or work / "data", plan.port, terminal.say))
+        terminal.headline(url, plan.room)
+        town = stack.enter_context(Town(url, plan.key, retry=Retry(attempts=8)))
+        try:
+            register(town, plan)
+            watched, posters = stack.enter_context(posted(town, plan.room, work, plan.seed, weigh=plan.weights))
+            player = Player(new_world(), watched, speed=plan.speed)
+            right = _story(town, player, posters, plan, terminal)
+            if not plan.once:
+                terminal.say(f"\nThe room lives on; look at {url}/ (Ctrl-C ends it).")
+                player.play(afternoon(player.world, np.random.default_rng(plan.seed)))
+        except TownError as error:
+            raise CommandError(str(error)) from error
+    return right
+
+
+def register(town: Town, plan: Plan) -> None:
+    """The room, the products and the ten objects, with weights only where the plan says so."""
+    town.rooms.put(plan.room, description(seed=plan.seed))
+    for item in ITEMS:
+        weights = {"weight_g": item.weight_g, "weight_sd_g": 1.0} if plan.weights else {}
+        town.products.put(item.jan, ProductIn(name=item.name, category=item.category, **weights))
+        town.objects.put(
+            item.tag,
+            ObjectFields(name=item.name, synonyms=list(item.synonyms), jan=item.jan, room=plan.room),
+        )
+
+
+def _story(town: Town, player: Player, posters: list[Poster], plan: Plan, terminal: Terminal) -> bool:
+    wrong = 0
+    player.switch_on()
+    for number, step in enumerate(STEPS):
+        terminal.step(number, step.title)
+        player.play(step.act(player.world))
+        _delivered(posters)
+        found = pies.pies_of(town.placements(plan.room), MOVED)
+        off = pies.differences(step.expected(plan.weights), found)
+        terminal.pies(found, off)
+        wrong += len(off)
+    terminal.verdict(wrong)
+    if plan.weights:
+        terminal.say(f"Weight knew objects 3 and 4 apart {READ_S:.1f} s before the tag was read (step 5).")
+    return wrong == 0
+
+
+def _delivered(posters: list[Poster]) -> None:
+    """Wait until the server has acknowledged everything observed so far."""
+    for poster in posters:
+        if not poster.drain(DELIVERY_S):
+            raise CommandError(f"agent {poster.spool.agent} cannot deliver: {poster.trouble or 'timed out'}")

@@ -1,0 +1,36 @@
+"""After the story: an ordinary afternoon. The person walks about, now and then carries a thing to another cabinet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tms_agents.simulation.room import PERSON, ROBOT
+from tms_agents.simulation.story import Script, wait, walk
+from tms_agents.simulation.world import InCabinet, World
+
+_FRONTS = {"cabinet-a": "front of A", "cabinet-b": "front of B", "cabinet-c": "front of C"}
+_STROLL = ("middle", "north", "bed", "east", "south")
+
+
+def afternoon(world: World, rng: np.random.Generator) -> Script:
+    """Never ends. Starts where the story left the two."""
+    yield from walk(world, ROBOT, "table side", "dock")
+    here = "front of B"
+    while True:
+        yield from wait(world, float(rng.uniform(3.0, 8.0)))
+        if rng.random() < 0.5:
+            there = str(rng.choice([spot for spot in _STROLL if spot != here]))
+            yield from walk(world, PERSON, here, there)
+            here = there
+            continue
+        tags = sorted(tag for tag, place in world.places.items() if isinstance(place, InCabinet))
+        tag = str(rng.choice(tags))
+        place = world.places[tag]
+        assert isinstance(place, InCabinet)
+        there = str(rng.choice([cabinet for cabinet in _FRONTS if world.free_slots(cabinet)]))
+        yield from walk(world, PERSON, here, _FRONTS[place.cabinet])
+        world.take(PERSON, tag)
+        yield from wait(world, 1.5)
+        yield from walk(world, PERSON, _FRONTS[place.cabinet], _FRONTS[there])
+        world.put(PERSON, tag, there, world.free_slots(there)[0])
+        here = _FRONTS[there]

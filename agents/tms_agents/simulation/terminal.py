@@ -1,0 +1,41 @@
+"""What the demo says on the terminal; plain text where it is piped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TextIO
+
+from tms_agents.simulation import pies
+
+
+class Terminal:
+    def __init__(self, out: TextIO, *, colour: bool | None = None) -> None:
+        """``colour`` None: only where ``out`` is a terminal."""
+        self._out = out
+        self._colour = out.isatty() if colour is None else colour
+
+    def say(self, text: str) -> None:
+        self._out.write(f"{text}\n")
+        self._out.flush()
+
+    def headline(self, url: str, room: str) -> None:
+        self.say(f"The page: {self._bold(f'{url}/')}\nTen objects in room {room!r}; the experiment begins.")
+
+    def step(self, number: int, title: str) -> None:
+        self.say(f"\n{self._bold(f'({number})')} {title}")
+
+    def pies(self, found: Mapping[int, Mapping[str, float]], off: list[str]) -> None:
+        self._out.write(pies.draw(found, colour=self._colour))
+        for line in off:
+            self.say(f"    NOT AS EXPECTED: {line}")
+        self._out.flush()
+
+    def verdict(self, wrong: int) -> None:
+        self.say(
+            "\nEvery pie is as in the paper, within 0.02."
+            if wrong == 0
+            else f"\n{wrong} slices are not as in the paper."
+        )
+
+    def _bold(self, text: str) -> str:
+        return f"\x1b[1m{text}\x1b[0m" if self._colour else text
