@@ -89,9 +89,7 @@ async def append_registry(session: AsyncSession, room: str, body: RegistryBody, 
         if first_seen is not None:
             removed_at = await _removed(session, agent, body.tag)
             effective_at = max(min(effective_at, first_seen - 1), removed_at)
-            await session.execute(
-                delete(UnknownTagRow).where(this), execution_options={"synchronize_session": "fetch"}
-            )
+            await session.execute(delete(UnknownTagRow).where(this), execution_options={"synchronize_session": "fetch"})
     await session.execute(
         insert(LogRow).values(
             room=room,
@@ -101,7 +99,7 @@ async def append_registry(session: AsyncSession, room: str, body: RegistryBody, 
             observed_at=effective_at,
             received_at=to_us(now),
             kind=REGISTRY,
-            body=body.model_dump_json(exclude_none=True, by_alias=True),
+            body=body.model_dump_json(by_alias=True),
             late=False,
         )
     )
@@ -116,7 +114,7 @@ async def _newest(session: AsyncSession, room: str, now: int) -> int:
 
 async def _removed(session: AsyncSession, agent: str, tag: str) -> int:
     """When the room last stopped tracking ``tag`` (0 if never): it cannot be registered again before that."""
-    of_tag = literal(ObjectRemoved(tag=tag).model_dump_json(exclude_none=True, by_alias=True))
+    of_tag = literal(ObjectRemoved(tag=tag).model_dump_json(by_alias=True))
     found = await session.scalar(
         select(func.max(LogRow.observed_at)).where(LogRow.agent == agent, LogRow.body == of_tag)
     )

@@ -24,9 +24,7 @@ class RoomLog(Protocol):
     async def read(self, room: str, after: int, limit: int) -> list[Record]:
         """The next ``limit`` records after an offset, in order of offset."""
 
-    def replay(
-        self, room: str, *, after: Position, until: Position | None, head: int
-    ) -> AsyncIterator[list[Record]]:
+    def replay(self, room: str, *, after: Position, until: Position | None, head: int) -> AsyncIterator[list[Record]]:
         """Records up to offset ``head`` with ``after < position <= until``, in fold order, in pages; none late."""
 
     async def heads(self) -> dict[str, int]:
