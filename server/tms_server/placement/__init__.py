@@ -5,6 +5,7 @@ Knows nothing of HTTP or SQL. ``Engine`` is exact without a budget and a resampl
 """
 
 from tms_server.placement.engine import Engine
+from tms_server.placement.paper import PaperFilter
 from tms_server.placement.parameters import LIVE, PAPER, ParameterError, Parameters
 from tms_server.placement.specs import (
     OUT,
@@ -16,6 +17,7 @@ from tms_server.placement.specs import (
     LabelState,
     ObjectSpec,
 )
+from tms_server.placement.warm import warm_up
 
 __all__ = [
     "LIVE",
@@ -29,6 +31,8 @@ __all__ = [
     "LabelSpec",
     "LabelState",
     "ObjectSpec",
+    "PaperFilter",
     "ParameterError",
     "Parameters",
+    "warm_up",
 ]

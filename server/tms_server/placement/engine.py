@@ -268,16 +268,12 @@ class Engine:
     def to_bytes(self) -> bytes:
         """The whole state: portable, versioned, checked. Folding on after ``from_bytes`` is bit-identical."""
         header = {
-            "objects": [
-                {"id": s.id, "tag": s.tag, "weight_g": s.weight_g, "weight_sd_g": s.weight_sd_g,
-                 "size_m": s.size_m, "p_read": s.p_read}
-                for s in self._objects.specs
-            ],
+            "objects": self._objects.to_json(),
             "parameters": self._parameters.to_dict(),
             "labels": self._labels.to_json(),
             "budget": self.budget,
             "lost": None if math.isinf(self._lost) else self._lost,
-        }  # fmt: skip
+        }
         b = self._belief
         return pack("engine", header, {"rows": b.rows, "w": b.w, "cols": b.cols, "pinned": b.pinned})
 
@@ -293,5 +289,3 @@ class Engine:
         engine._lost = math.inf if header["lost"] is None else header["lost"]
         engine._belief = Hypotheses(arrays["rows"], arrays["w"], arrays["cols"], arrays["pinned"])
         return engine
-
-

@@ -96,5 +96,3 @@ def _all(n: int, shelf: list[int], elsewhere: list[int]) -> Any:
             for i, slot in zip((*holders, *rest), (*shelf, *places), strict=True):
                 row[i] = slot
             yield row
-
-

@@ -94,10 +94,11 @@ def give(
 ) -> Any:  # fmt: skip
     """Children of "somebody gave one of the things he holds": appear and hand-over.
 
-    cand_of [S]: candidate index of a slot or -1. logk [Q]: log kernel of each candidate. near [Q]: within the gate (or
-    not subject to it). dest [Q]: where a thing of that candidate goes. n_pinned [Q], pin_obj, pin_slot: certain objects at
-    candidates. ``u`` mass of the giving, ``stay`` mass of nothing moving; an empty-handed candidate's mass is lost, or
-    joins ``stay`` if ``idle_to_stay``. Jump: a thing at a ``jumpable`` slot, or one of jump_obj, goes to dest[0].
+    cand_of [S + 1]: candidate index of a slot or -1. logk [Q]: log kernel of each candidate. near [Q]: 1 inside the
+    gate, 0 outside, 2 not subject to it. dest [Q]: where a thing of that candidate goes. n_pinned [Q], pin_obj,
+    pin_slot: certain objects at candidates. ``u`` mass of the giving, ``stay`` mass of nothing moving; an empty-handed
+    candidate's mass is lost, or joins ``stay`` if ``idle_to_stay``. Jump: a thing at a ``jumpable`` slot, or one of
+    jump_obj, goes to dest[0].
     lik [N + 1]: likelihood of the content of the label after the event.
 
     Returns (parent, obj, to, weight, hash, count).
@@ -131,9 +132,7 @@ def give(
             elif jumpable[slot]:
                 n_jump += 1
         still = stay
-        if n_q == 0:
-            still += u
-        elif holding and not _normalise(logk, near, held, True, p):
+        if n_q == 0 or (holding and not _normalise(logk, near, held, True, p)):
             still += u
         if idle_to_stay:
             for q in range(n_q):
@@ -185,7 +184,6 @@ def _normalise(logk: Any, near: Any, held: Any, only_held: bool, p: Any) -> bool
     inside = False
     top = -np.inf
     for q in range(logk.shape[0]):
-        # near: 1 mover inside the gate, 0 mover outside, 2 ghost (no gate)
         if (not only_held or held[q] > 0) and near[q] == 1:
             inside = True
     for q in range(logk.shape[0]):
@@ -308,9 +306,7 @@ def merge(
 
 
 @njit(cache=True)
-def _same(
-    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, a: int, b: int
-) -> bool:
+def _same(rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, a: int, b: int) -> bool:
     """Whether two children are the same placement, object by object."""
     oa, ob = obj[a], obj[b]
     for k in range(cols.shape[0]):
@@ -347,9 +343,7 @@ def child_marginals(
 
 
 @njit(cache=True)
-def build(
-    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any
-) -> Any:
+def build(rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any) -> Any:
     """Write the children out as rows; objects that became certain leave play, those that are not any more enter it.
 
     Updates col_of and pinned. Returns (rows, cols, touched): columns are in the order of the objects; touched are the
@@ -434,7 +428,7 @@ def marginals(rows: Any, w: Any, slots: int) -> Any:
 
 
 @njit(cache=True)
-def threshold(cw: Any, budget: int) -> float:
+def threshold(cw: Any, budget: int) -> Any:
     """Fearnhead and Clifford's c: sum of min(w / c, 1) = budget. Weights above c are kept as they are."""
     rest = cw.sum()
     c = rest / budget

@@ -52,9 +52,7 @@ def swapped(world: World, event: MoverSwap) -> Steps:
     still = np.full(both.shape[0], -1, np.int32)
     mass = np.concatenate([belief.w * (1.0 - p), belief.w * p])
     parent = np.arange(both.shape[0], dtype=np.int32)
-    yield Step(
-        Children(parent, still, still.copy(), mass, np.concatenate([belief.zob, zob])), rows=both, also=sure
-    )
+    yield Step(Children(parent, still, still.copy(), mass, np.concatenate([belief.zob, zob])), rows=both, also=sure)
 
 
 def transferred(world: World, event: Transfer) -> Steps:
@@ -77,9 +75,7 @@ def transferred(world: World, event: Transfer) -> Steps:
     if kind != "mover" and (here > 1).any():
         raise InvalidEvent(f"label {event.to!r} cannot hold several objects")
     labels.rename(slot, event.to, kind, event.xy or labels[slot].xy)
-    concerned = np.concatenate(
-        [np.flatnonzero(belief.pinned == slot), belief.cols[(belief.rows == slot).any(axis=0)]]
-    )
+    concerned = np.concatenate([np.flatnonzero(belief.pinned == slot), belief.cols[(belief.rows == slot).any(axis=0)]])
     if concerned.size:
         yield Step(None, also=concerned)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +73,10 @@ class ObjectTable:
         )  # fmt: skip
         return likelihood
 
+    def to_json(self) -> list[dict[str, Any]]:
+        """The specs as plain JSON types."""
+        return [asdict(s) for s in self.specs]
+
     def read_of(self, tag: str | None) -> int:
         """What a reader's report means: an object's index, NOTHING or NO_READER (also for unregistered tags)."""
         if tag is None:
@@ -88,5 +94,3 @@ def _check(spec: ObjectSpec) -> None:
         value = getattr(spec, name)
         if value is not None and not low <= value <= high:
             raise ValueError(f"object {spec.id}: {name} must be between {low:g} and {high:g}, got {value!r}")
-
-

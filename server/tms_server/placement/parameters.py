@@ -79,9 +79,7 @@ class Parameters:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON types; ``Parameters.of(p.to_dict()) == p``."""
-        return {
-            f.name: dict(v) if isinstance(v := getattr(self, f.name), Mapping) else v for f in fields(self)
-        }
+        return {f.name: dict(v) if isinstance(v := getattr(self, f.name), Mapping) else v for f in fields(self)}
 
     def _consistent(self) -> Parameters:
         for kind, phantom in self.p_phantom.items():

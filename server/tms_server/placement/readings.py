@@ -98,8 +98,8 @@ def load_change(world: World, event: LoadChange) -> Steps:
 def correction(world: World, event: Correction) -> Steps:
     """A person says where an object is or is not: factor r or 1 - r.
 
-    Where the model lets things jump (p_jump), the object may also have got there unseen just before: else a person could
-    never correct a belief that holds the truth for impossible.
+    Where the model lets things jump (p_jump), the object may also have got there unseen just before: else a person
+    could never correct a belief that holds the truth for impossible.
     """
     if event.label != OUT and event.label not in world.labels.states():
         raise InvalidEvent(f"label {event.label!r} is not known")
@@ -139,5 +139,3 @@ def _jumped(world: World, obj: int, slot: int) -> Children:
         np.concatenate([np.where(room, belief.w * (1.0 - p), belief.w), belief.w[come] * p]),
         np.concatenate([belief.zob, (belief.zob ^ moved)[come]]),
     )
-
-

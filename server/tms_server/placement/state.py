@@ -25,8 +25,8 @@ class Children(NamedTuple):
 class Hypotheses:
     """Placements with weights. Only objects in play have a column; the others are pinned to one slot.
 
-    ``rows`` int32 [H, K], ``w`` float64 [H] (sum 1), ``zob`` uint64 [H] (relative: equal placements have equal hashes),
-    ``cols`` int32 [K] (object of each column, ascending), ``pinned`` int32 [N] (slot, -1 in play), ``col_of`` int32 [N].
+    ``rows`` int32 [H, K], ``w`` float64 [H] (sum 1), ``zob`` uint64 [H] (equal placements have equal hashes), ``cols``
+    int32 [K] (object of each column, ascending), ``pinned`` int32 [N] (slot, -1 in play), ``col_of`` int32 [N].
     """
 
     def __init__(self, rows: Array, w: Array, cols: Array, pinned: Array) -> None:
@@ -95,9 +95,7 @@ class Hypotheses:
         if chosen is not None:
             keep, w = chosen
             parent, obj, to, zob = parent[keep], obj[keep], to[keep], zob[keep]
-        self.rows, self.cols, touched = kernels.build(
-            rows, self.cols, self.col_of, self.pinned, parent, obj, to
-        )
+        self.rows, self.cols, touched = kernels.build(rows, self.cols, self.col_of, self.pinned, parent, obj, to)
         self.w, self.zob = w, zob
         self._marginals = None
         return total, touched

@@ -1,7 +1,8 @@
 """What an event handler hands to the engine: one or more steps, each an update of the whole belief.
 
-A handler is a generator. It checks its event first (raising ``InvalidEvent`` with nothing changed), then yields steps; the
-engine applies each and sends back whether it was possible. What must happen afterwards stands after the yield.
+A handler is a generator. It checks its event first (raising ``InvalidEvent`` with nothing changed), then yields
+steps; the engine applies each and sends back whether it was possible. What must happen afterwards stands after the
+yield.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ class Step(NamedTuple):
     """One update. ``children`` None: every hypothesis has the same likelihood ``factor`` and nothing moves.
 
     ``ceiling`` is the largest likelihood factor that the step can apply (for the certificate). ``merge``: children may
-    coincide. ``rows``: what the children's parents index, where it is not the present rows. ``also``: objects whose marginals
-    change beyond those that the children move or that are in play.
+    coincide. ``rows``: what the children's parents index, where it is not the present rows. ``also``: objects whose
+    marginals change beyond those that the children move or that are in play. ``counts``: whether its mass is part of
+    the event's evidence.
     """
 
     children: Children | None
@@ -31,7 +33,7 @@ class Step(NamedTuple):
     merge: bool = True
     rows: Array | None = None
     also: Array | None = None
-    counts: bool = True  # whether its mass is part of the event's evidence
+    counts: bool = True
 
 
 class World(NamedTuple):

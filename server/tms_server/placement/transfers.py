@@ -47,9 +47,7 @@ def appeared(world: World, event: LabelAppeared, p_jump: float | None) -> Steps:
     yield Step(children, ceiling=float(likelihood.max()))
 
 
-def _candidates(
-    world: World, xy: tuple[float, float], source: int | None
-) -> tuple[list[int], Array, Array]:
+def _candidates(world: World, xy: tuple[float, float], source: int | None) -> tuple[list[int], Array, Array]:
     """Who may have put a thing at ``xy``: slots, log kernels, and 1 inside the gate, 0 outside it, 2 no gate."""
     if source is not None:
         return [source], np.zeros(1), np.ones(1, np.int64)
@@ -125,9 +123,7 @@ def vanished(world: World, event: LabelVanished) -> Steps:
         dest, p_dest = np.array([OUT_SLOT], np.int32), np.array([1.0 - hidden])
     likelihood = world.objects.likelihoods(weight_g=event.weight_g)
 
-    possible = yield Step(
-        _spread(world, slot, dest, p_dest, hidden, likelihood), ceiling=float(likelihood.max())
-    )
+    possible = yield Step(_spread(world, slot, dest, p_dest, hidden, likelihood), ceiling=float(likelihood.max()))
     if not possible:  # the thing is gone all the same
         yield Step(_spread(world, slot, dest, p_dest, hidden, world.objects.none), counts=False)
     if hidden > 0.0:
@@ -139,9 +135,7 @@ def vanished(world: World, event: LabelVanished) -> Steps:
             labels.remove(ghost)
 
 
-def _spread(
-    world: World, slot: int, dest: Array, p_dest: Array, stay: float, likelihood: Array
-) -> Children:
+def _spread(world: World, slot: int, dest: Array, p_dest: Array, stay: float, likelihood: Array) -> Children:
     belief = world.belief
     here = np.flatnonzero(belief.pinned == slot)
     return cut(
@@ -231,5 +225,3 @@ def entered_with(world: World, slot: int) -> Steps:
                 )
             )
         )  # fmt: skip
-
-
