@@ -1,0 +1,215 @@
+"""Drivers against the emulators over real TCP and pseudo terminals: readings, states, faults, recovery."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+import threading
+import time
+
+import pytest
+
+from tms_agents.devices.llrp.emulator import LlrpEmulator
+from tms_agents.devices.llrp.session import LlrpSession
+from tms_agents.devices.tags import TagRead
+from tms_agents.devices.tr3.codec import Frame
+from tms_agents.devices.tr3.emulator import PtyLine, TcpLine, Tr3Device
+from tms_agents.devices.tr3.session import Tr3Session
+from tms_agents.devices.transport import DeviceState, Link, serial, tcp
+from tms_client import Retry
+
+QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
+EPC = "30352B2E4401D3000000007B"
+UID = "E00401004E17F97A"
+
+
+def llrp(port: int, **options) -> Link[TagRead]:
+    options = {"silent_after_s": 0.5, "tick_s": 0.02, "retry": QUICK, **options}
+    return Link(tcp("127.0.0.1", port), lambda: LlrpSession(keepalive_s=0.1), name="reader", **options)
+
+
+def tr3(opener, **options) -> Link[TagRead]:
+    options = {"silent_after_s": 0.5, "tick_s": 0.01, "retry": QUICK, **options}
+    return Link(opener, lambda: Tr3Session(poll_s=0.02, reply_s=0.1), name="tr3", **options)
+
+
+async def until(link: Link[TagRead], wanted, act=None, timeout_s: float = 8.0) -> list[TagRead | DeviceState]:
+    """Listen until an item satisfies ``wanted``; all items so far. ``act`` is called after each item."""
+    seen: list[TagRead | DeviceState] = []
+    async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
+        async for item in items:
+            seen.append(item)
+            if wanted(item, seen):
+                return seen
+            if act:
+                act(item)
+    raise AssertionError("the link ended")
+
+
+def is_read(item, seen) -> bool:
+    return isinstance(item, TagRead)
+
+
+def states(seen) -> list[str]:
+    return [item.state for item in seen if isinstance(item, DeviceState)]
+
+
+async def test_llrp_reports_tags_and_is_kept_alive():
+    async with LlrpEmulator(period_s=0.02) as reader:
+        reader.see(EPC, antenna=3, rssi_dbm=-61)
+        seen = await until(llrp(reader.port), lambda item, seen: reader.acknowledged >= 2)
+        read = next(item for item in seen if isinstance(item, TagRead))
+        assert (read.tag, read.antenna, read.rssi_dbm) == (EPC, 3, -61.0) and read.first_seen is not None
+        assert states(seen) == ["connected"]
+        assert reader.heard[:4] == ["SET_READER_CONFIG", "DELETE_ROSPEC", "ADD_ROSPEC", "ENABLE_ROSPEC"]
+        await asyncio.sleep(0.05)
+        assert reader.heard[-1] == "CLOSE_CONNECTION"
+
+
+async def test_llrp_garbage_and_a_cut_cable():
+    async with LlrpEmulator(period_s=0.02) as reader:
+        reader.see(EPC)
+
+        def disturb(item):
+            if isinstance(item, TagRead) and reader.heard.count("ENABLE_ROSPEC") == 1:
+                reader.inject(b"\xff\xfe garbage \xff")
+                reader.hang_up()
+
+        seen = await until(
+            llrp(reader.port), lambda item, seen: is_read(item, seen) and "faulty" in states(seen), disturb
+        )
+        assert states(seen) == ["connected", "faulty", "connected"]
+
+
+async def test_llrp_reader_falls_silent_and_comes_back():
+    async with LlrpEmulator(period_s=0.02) as reader:
+        reader.see(EPC)
+
+        def hush(item):
+            reader.silent = isinstance(item, TagRead)
+
+        def back(item, seen):
+            return isinstance(item, TagRead) and "silent" in states(seen)
+
+        seen = await until(llrp(reader.port, silent_after_s=0.2), back, hush)
+        assert states(seen)[:2] == ["connected", "silent"] and states(seen)[-1] == "connected"
+
+
+async def test_llrp_second_client_and_refused_commands_say_why():
+    async with LlrpEmulator(period_s=0.02) as reader:
+        reader.refuse = 2
+        (state,) = await until(llrp(reader.port), lambda item, seen: True)
+        assert state == DeviceState(
+            "faulty", "reader: the reader refuses the connection: another client is connected already"
+        )
+        reader.refuse = 0
+        reader.fail = {"ADD_ROSPEC"}
+        (state,) = await until(llrp(reader.port), lambda item, seen: True)
+        assert state.why == "reader: ADD_ROSPEC_RESPONSE: status 101 ADD_ROSPEC fails"
+
+
+async def test_nobody_listens():
+    (state,) = await until(llrp(9), lambda item, seen: True)
+    assert state.state == "faulty" and "Connect call failed" in state.why
+
+
+async def test_sllurp_accepts_the_emulator():
+    """An independent client (of another project) sets the emulated reader up and gets its reports."""
+    sllurp = pytest.importorskip("sllurp.llrp")
+    got: list[str] = []
+    enough = threading.Event()
+
+    def report(client, tags):
+        got.extend(tag["EPC-96"].decode() for tag in tags)
+        enough.set()
+
+    async with LlrpEmulator(period_s=0.05) as reader:
+        reader.see(EPC)
+        config = sllurp.LLRPReaderConfig({"antennas": [1], "keepalive_interval": 200})
+        client = sllurp.LLRPReaderClient("127.0.0.1", reader.port, config)
+        client.add_tag_report_callback(report)
+        try:
+            await asyncio.to_thread(client.connect)
+            assert await asyncio.to_thread(enough.wait, 10)
+        finally:
+            await asyncio.to_thread(client.disconnect)
+            await asyncio.to_thread(client.join, 5)
+    assert set(got) == {EPC.lower()}
+    assert "GET_READER_CAPABILITIES" in reader.heard
+
+
+@pytest.mark.parametrize("line", ["pty", "tcp"])
+async def test_tr3_polls_its_antennas(line):
+    device = Tr3Device()
+    device.see(UID, antenna=0)
+    device.see("E00401508747FFC8", antenna=1)
+    place = PtyLine(device) if line == "pty" else TcpLine(device)
+    async with place:
+        opener = serial(place.path, 38400) if line == "pty" else tcp("127.0.0.1", place.port)
+        link = Link(opener, lambda: Tr3Session(antennas=(0, 1), poll_s=0.02), name="tr3", tick_s=0.01, retry=QUICK)
+        seen = await until(link, lambda item, seen: len(seen) == 7)
+        reads = {(item.tag, item.antenna) for item in seen if isinstance(item, TagRead)}
+        assert reads == {(UID, 0), ("E00401508747FFC8", 1)}
+        assert states(seen) == ["connected"]
+        await asyncio.sleep(0.05)
+        assert not device.rf_on  # left quiet
+
+
+async def test_tr3_one_antenna_is_read_again_and_again():
+    """The reader does not repeat a UID until the antenna is switched: the driver sees to that."""
+    device = Tr3Device()
+    device.see(UID)
+    async with PtyLine(device) as line:
+        seen = await until(tr3(serial(line.path, 38400)), lambda item, seen: len(seen) == 5)
+        assert [item.tag for item in seen if isinstance(item, TagRead)] == [UID] * 4
+
+
+async def test_tr3_garbage_silence_and_nack():
+    device = Tr3Device()
+    device.see(UID)
+    async with PtyLine(device) as line:
+        link = tr3(serial(line.path, 38400), silent_after_s=0.2)
+        reads = 0
+
+        def disturb(item):
+            nonlocal reads
+            reads += isinstance(item, TagRead)
+            if reads == 2:
+                line.inject(b"\x02\x00\x49\xf0 half a frame")
+            if reads == 4 and isinstance(item, TagRead):
+                device.silent = True
+            if isinstance(item, DeviceState) and item.state == "silent":
+                device.silent = False
+            if reads == 6 and isinstance(item, TagRead):
+                device.nack_next = 5
+
+        seen = await until(
+            link, lambda item, seen: reads >= 7 and "faulty" in states(seen) and is_read(item, seen), disturb
+        )
+        assert states(seen) == ["connected", "silent", "connected", "faulty", "connected"]
+        why = next(item.why for item in seen if isinstance(item, DeviceState) and item.state == "faulty")
+        assert why == "tr3: the reader refuses command 78: format error"
+
+
+async def test_tr3_rdloop_is_listened_to():
+    device = Tr3Device()
+    frame = Frame(0x4C, bytes.fromhex(UID)[::-1] + bytes(16)).encode()
+    async with PtyLine(device) as line:
+        link = Link(serial(line.path, 38400), lambda: Tr3Session(mode="rdloop"), name="tr3", tick_s=0.01)
+        stop = time.monotonic() + 5
+
+        async def transmit():
+            while time.monotonic() < stop:
+                line.inject(frame)
+                await asyncio.sleep(0.02)
+
+        sender = asyncio.create_task(transmit())
+        seen = await until(link, is_read)
+        sender.cancel()
+        assert seen[-1].tag == UID and device.heard == []
+
+
+async def test_no_such_serial_port(tmp_path):
+    (state,) = await until(tr3(serial(str(tmp_path / "tty"), 38400)), lambda item, seen: True)
+    assert state.state == "faulty" and "No such file" in state.why
