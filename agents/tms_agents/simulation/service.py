@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import re
@@ -94,7 +95,8 @@ def _stop(process: subprocess.Popen[str]) -> None:
     if process.poll() is None:
         process.terminate()
         try:
-            process.wait(15.0)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(15.0)
         finally:  # it hangs, or Ctrl-C came again: no server is left behind
             if process.poll() is None:
                 process.kill()
