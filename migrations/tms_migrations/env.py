@@ -6,6 +6,7 @@ import asyncio
 
 from alembic import context
 from sqlalchemy import Connection
+
 from tms_server.db.engine import WRITE, create_engine
 from tms_server.db.tables import Base
 from tms_server.settings import Settings

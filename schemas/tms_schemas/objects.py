@@ -43,6 +43,11 @@ class Product(ProductIn):
     jan: Jan
 
 
+class ProductPage(Model):
+    items: list[Product]
+    next_cursor: str | None = None
+
+
 class ObjectFields(Model):
     """What is known of one thing. Size, weight, category and shape fall back to those of its product."""
 
@@ -137,6 +142,8 @@ class CatalogueImport(Model):
 
     stored: int
     refused: list[CatalogueProblem] = []
+    #: Columns that a product has no field for.
+    ignored_columns: list[str] = []
 
 
 class CatalogueProblem(Model):

@@ -61,6 +61,7 @@ def upgrade() -> None:
         sa.Column("weight_sd_g", sa.Float(precision=53), nullable=True),
         sa.Column("category", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=True),
         sa.Column("shape", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=True),
+        sa.Column("search_text", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False),
         sa.Column("updated_at", sa.BigInteger(), nullable=False),
         sa.PrimaryKeyConstraint("jan", name=op.f("pk_products")),
     )
@@ -111,9 +112,7 @@ def upgrade() -> None:
         sa.Column("tracking", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False),
         sa.Column("tag_pose", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=True),
         sa.Column("user_memory", sa.LargeBinary(), nullable=True),
-        sa.Column(
-            "search_text", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False
-        ),
+        sa.Column("search_text", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False),
         sa.Column("created_at", sa.BigInteger(), nullable=False),
         sa.Column("updated_at", sa.BigInteger(), nullable=False),
         sa.ForeignKeyConstraint(["jan"], ["products.jan"], name=op.f("fk_objects_jan")),

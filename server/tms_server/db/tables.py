@@ -42,6 +42,8 @@ class ProductRow(Base):
     weight_sd_g: Mapped[float | None]
     category: Mapped[str | None]
     shape: Mapped[str | None]
+    #: Name, category and JAN, folded for search (objects/search.py).
+    search_text: Mapped[str]
     updated_at: Mapped[int]
 
 
@@ -60,7 +62,7 @@ class ObjectRow(Base):
     tracking: Mapped[str]
     tag_pose: Mapped[str | None]
     user_memory: Mapped[bytes | None]
-    #: Names, synonyms and category folded for search (see objects/search text rules).
+    #: Name, synonyms, category (also the product's), tag and JAN, folded for search (objects/search.py).
     search_text: Mapped[str]
     created_at: Mapped[int]
     updated_at: Mapped[int]
