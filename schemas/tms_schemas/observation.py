@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -146,12 +146,20 @@ def labels_named(observation: Observation) -> list[str]:
     if isinstance(observation, Inventory):
         return [item.label for item in observation.labels]
     names: list[str] = []
-    for field in ("label", "source", "dest", "from_", "to", "a", "b"):
-        value = getattr(observation, field, None)
+    for field in _LABEL_FIELDS[type(observation)]:
+        value = getattr(observation, field)
         if isinstance(value, str):
             names.append(value)
-    names.extend(getattr(observation, "labels", None) or [])
+        elif isinstance(value, list):
+            names.extend(value)
     return names
+
+
+#: Fields of each type that name labels; a mover may also be given as ``Near``, which names none.
+_LABEL_FIELDS: dict[type[Model], tuple[str, ...]] = {
+    kind: tuple(f for f in ("label", "labels", "source", "dest", "from_", "to", "a", "b") if f in kind.model_fields)
+    for kind in get_args(Observation)
+}
 
 
 class ObservationBatch(Model):

@@ -1,7 +1,45 @@
-"""Endpoints."""
+"""``POST /v1/observations``."""
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Any
 
-router = APIRouter()
+from fastapi import APIRouter, Request
+
+from tms_schemas.observation import BatchAccepted, ObservationBatch
+from tms_server.auth import Caller, require_observe
+from tms_server.ingest.admission import admit
+from tms_server.town import Town
+
+router = APIRouter(tags=["observations"])
+
+
+def _inlined(schema: Any, definitions: dict[str, Any]) -> Any:
+    """The schema with every reference replaced by what it refers to (no wire model is recursive)."""
+    if isinstance(schema, list):
+        return [_inlined(part, definitions) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if "$ref" in schema:
+        return _inlined(definitions[schema["$ref"].rpartition("/")[2]], definitions)
+    return {k: _inlined(v, definitions) for k, v in schema.items() if k not in ("$defs", "discriminator")}
+
+
+def _request_body() -> dict[str, Any]:
+    schema = ObservationBatch.model_json_schema()
+    return {"required": True, "content": {"application/json": {"schema": _inlined(schema, schema["$defs"])}}}
+
+
+# The body is validated once, from its bytes: letting the framework parse it to Python objects first costs more.
+@router.post("/observations", openapi_extra={"requestBody": _request_body()})
+async def post_observations(request: Request, caller: Caller) -> BatchAccepted:
+    """Record a batch of one agent in one room, whole or not at all; answered once it is durable.
+
+    The same (agent, seq) with the same body again counts as a duplicate; with another body it is a conflict (409)
+    and nothing of the batch is recorded. 429 and 503 say when to send the same batch again.
+    """
+    batch = admit(await request.body())
+    require_observe(caller, batch.room)
+    town: Town = request.state.town
+    done = await town.writer.submit(batch)
+    return BatchAccepted(accepted=done.accepted, duplicates=done.duplicates, head=done.head, too_late=done.too_late)

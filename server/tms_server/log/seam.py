@@ -33,6 +33,12 @@ class RoomLog(Protocol):
     async def head(self, room: str) -> int | None:
         """Newest offset of one room; None where there is no such room."""
 
+    async def head_at(self, room: str, received_at: int) -> int:
+        """Newest offset recorded at ``received_at`` (microseconds UTC) or before; 0 where there is none."""
+
+    def committed(self, room: str) -> int:
+        """Newest offset that this process appended; costs nothing. 0 where it appended none."""
+
     def poke(self, room: str) -> None:
         """Tell followers in this process that the room has new records."""
 
@@ -49,13 +55,12 @@ class Snapshot(NamedTuple):
 class Snapshots(Protocol):
     """Folded states of a room. A snapshot saves time only: the log alone says what is true."""
 
-    async def load(self, room: str, *, head: int, before: Position | None = None) -> AsyncIterator[Snapshot]:
+    def load(self, room: str, *, head: int, before: Position | None = None) -> AsyncIterator[Snapshot]:
         """Usable snapshots, newest position first.
 
         Usable: at a position <= ``before``, at an offset <= ``head``, and no record between its offset and ``head``
         belongs before its position.
         """
-        yield NotImplemented
 
     async def save(self, snapshot: Snapshot) -> None:
         """Keep it; older ones are thinned out, the farther back the fewer."""

@@ -51,6 +51,7 @@ class SqlRoomLog:
         self._store: Store = (
             SqliteStore(str(make_url(engine.url).database)) if is_sqlite(engine) else PostgresStore(engine)
         )
+        self._committed: dict[str, int] = {}
         self._news: defaultdict[str, asyncio.Event] = defaultdict(asyncio.Event)
 
     async def append(self, batches: Sequence[Batch]) -> list[Verdict]:
@@ -59,6 +60,7 @@ class SqlRoomLog:
             plan = await self._store.append(batches, choose, newest=self._retention_us is not None)
         except Exception as error:
             raise Unavailable(f"the log cannot be written: {type(error).__name__}", retry_after_s=2) from error
+        self._committed.update(plan.heads)
         for room in plan.heads:
             self.poke(room)
         return plan.verdicts
@@ -113,10 +115,12 @@ class SqlRoomLog:
             return await connection.scalar(select(RoomRow.head).where(RoomRow.room == room))
 
     async def head_at(self, room: str, received_at: int) -> int:
-        """Newest offset that was recorded at ``received_at`` (microseconds UTC) or before; 0 where there is none."""
         query = select(func.max(LogRow.offset)).where(LogRow.room == room, LogRow.received_at <= received_at)
         async with self._engine.connect() as connection:
             return await connection.scalar(query) or 0
+
+    def committed(self, room: str) -> int:
+        return self._committed.get(room, 0)
 
     def poke(self, room: str) -> None:
         # Whoever waits holds this event; the next to wait gets a fresh one, so no news falls between.

@@ -15,23 +15,7 @@ What others use of ``Town`` (``request.state.town``):
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from tms_server.town.town import Town, open_town
+from tms_server.town.views import RoomView
 
-from sqlalchemy.ext.asyncio import AsyncEngine
-
-from tms_server.clock import Clock
-from tms_server.db.session import Sessions
-from tms_server.settings import Settings
-
-
-class Town:
-    """All rooms of one server."""
-
-    def poke(self, room: str) -> None:
-        """The log of ``room`` has new records."""
-
-
-@asynccontextmanager
-async def open_town(engine: AsyncEngine, sessions: Sessions, settings: Settings, clock: Clock) -> AsyncIterator[Town]:
-    yield Town()
+__all__ = ["RoomView", "Town", "open_town"]

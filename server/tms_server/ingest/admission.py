@@ -1,0 +1,98 @@
+"""From the bytes of a request to a batch that may enter the log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import from_json
+
+from tms_schemas.observation import (
+    AgentState,
+    Handover,
+    Inventory,
+    LabelAppeared,
+    Observation,
+    ObservationBatch,
+    RawRead,
+    TagObserved,
+    labels_named,
+)
+from tms_schemas.problem import ProblemItem
+from tms_server import problems
+from tms_server.db.times import to_us
+from tms_server.errors import Invalid, TmsError
+from tms_server.log.record import Batch, Item, TagRead
+
+#: Problems reported of one batch.
+_MOST_PROBLEMS = 100
+
+
+def admit(body: bytes) -> Batch:
+    """Parse, validate and reduce a batch to what the log stores.
+
+    Raises:
+        BadRequest: no JSON.
+        Invalid: not a batch; the items are named by index and seq.
+    """
+    try:
+        batch = ObservationBatch.model_validate_json(body)
+    except ValidationError as error:
+        raise _naming_seq(problems.from_pydantic(error), body) from None
+    foreign = _foreign_labels(batch)
+    if foreign:
+        raise Invalid(f"{foreign[0].where}: {foreign[0].why}", items=foreign[:_MOST_PROBLEMS])
+    return Batch(batch.agent, batch.room, [_item(observation) for observation in batch.observations])
+
+
+def _item(observation: Observation) -> Item:
+    # What was sent, no more: a tag that is null and a tag that is absent are different observations.
+    body = observation.__pydantic_serializer__.to_json(observation, exclude_unset=True, by_alias=True).decode()
+    return Item(
+        observation.seq,
+        to_us(observation.observed_at),
+        observation.type,
+        body,
+        _tag_reads(observation),
+        (observation.state, observation.why.replace("\0", "")) if isinstance(observation, AgentState) else None,
+    )
+
+
+def _tag_reads(observation: Observation) -> tuple[TagRead, ...]:
+    """The tags it read, each once."""
+    match observation:
+        case LabelAppeared(tag=str(tag), label=label, xy=(x, y)):
+            return (TagRead(tag, label, x, y),)
+        case TagObserved(tag=tag, label=label):
+            return (TagRead(tag, label, None, None),)
+        case RawRead(tag=str(tag)) | Handover(tag=str(tag)):
+            return (TagRead(tag, None, None, None),)
+        case Inventory(labels=labels):
+            reads = [TagRead(i.tag, i.label, i.xy[0], i.xy[1]) for i in labels if i.tag is not None]
+            return tuple({read.tag: read for read in reads}.values())
+    return ()
+
+
+def _foreign_labels(batch: ObservationBatch) -> list[ProblemItem]:
+    """An agent names its own labels only; what it knows of others it gives as positions."""
+    own = batch.agent + "/"
+    found = []
+    for index, observation in enumerate(batch.observations):
+        for label in labels_named(observation):
+            if not label.startswith(own) or label == own:
+                why = f"label {label!r} is not one of agent {batch.agent} ({own}...)"
+                where = f"observations/{index}"
+                found.append(ProblemItem(where=where, why=why, index=index, seq=observation.seq))
+    return found
+
+
+def _naming_seq(error: TmsError, body: bytes) -> TmsError:
+    """The same problem with the seq of each named item, where the item has a readable one."""
+    if any(item.index is not None for item in error.items):
+        document: Any = from_json(body)
+        for item in error.items:
+            if item.index is not None:
+                observation = document["observations"][item.index]
+                seq = observation.get("seq") if isinstance(observation, dict) else None
+                item.seq = seq if isinstance(seq, int) and not isinstance(seq, bool) else None
+    return error

@@ -1,0 +1,115 @@
+"""The group-commit writer: batches that arrive while a transaction runs share the next one."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from tms_server.errors import TmsError, TooManyRequests, Unavailable
+from tms_server.log.record import Appended, Batch
+from tms_server.log.seam import RoomLog
+from tms_server.settings import Settings
+
+_log = logging.getLogger(__name__)
+#: Observations of one transaction, at most (a batch is never split).
+_GROUP = 5000
+
+
+class _Waiting(NamedTuple):
+    batch: Batch
+    verdict: asyncio.Future[Appended]
+
+
+class GroupWriter:
+    """Refuses what it cannot hold, acknowledges only what is durable.
+
+    ``backlog`` tells how many records of a room are durable but not yet folded.
+    """
+
+    def __init__(self, log: RoomLog, settings: Settings, backlog: Callable[[str], int]) -> None:
+        self._log = log
+        self._settings = settings
+        self._backlog = backlog
+        self._queue: deque[_Waiting] = deque()
+        self._held: Counter[str] = Counter()
+        self._total = 0
+        self._wake = asyncio.Event()
+        self._closing = False
+
+    async def submit(self, batch: Batch) -> Appended:
+        """Returns after durability.
+
+        Raises:
+            TooManyRequests: the agent has too many observations waiting.
+            Unavailable: the queue of all agents or the room's fold is full, or the database failed.
+            Conflict, NotFound: see ``RoomLog.append``.
+        """
+        self._admit(batch)
+        waiting = _Waiting(batch, asyncio.get_running_loop().create_future())
+        self._queue.append(waiting)
+        self._hold(batch, +1)
+        self._wake.set()
+        return await waiting.verdict
+
+    async def run(self) -> None:
+        """Write until ``close`` was called and everything admitted is durable or refused."""
+        while self._queue or not self._closing:
+            if not self._queue:
+                self._wake.clear()
+                await self._wake.wait()
+                continue
+            group = self._next_group()
+            try:
+                await self._write(group)
+            finally:
+                for waiting in group:
+                    self._hold(waiting.batch, -1)
+
+    def close(self) -> None:
+        self._closing = True
+        self._wake.set()
+
+    async def _write(self, group: list[_Waiting]) -> None:
+        try:
+            verdicts = await self._log.append([waiting.batch for waiting in group])
+        except TmsError as error:
+            _log.error("%d batches refused: %s", len(group), error, exc_info=error.__cause__)
+            # An exception of its own for each: a raised one grows a traceback per waiter.
+            verdicts = [Unavailable(error.detail, retry_after_s=error.retry_after_s) for _ in group]
+        for waiting, verdict in zip(group, verdicts, strict=True):
+            if waiting.verdict.done():  # the client went away; what was recorded is a duplicate when it comes back
+                continue
+            if isinstance(verdict, Appended):
+                waiting.verdict.set_result(verdict)
+            else:
+                waiting.verdict.set_exception(verdict)
+
+    def _admit(self, batch: Batch) -> None:
+        count, limits = len(batch.items), self._settings
+        if self._closing:
+            raise Unavailable("the server is shutting down", retry_after_s=5)
+        if self._held[batch.agent] and self._held[batch.agent] + count > limits.queue_per_agent:
+            raise TooManyRequests(
+                f"agent {batch.agent} has {self._held[batch.agent]} observations waiting to be written", retry_after_s=1
+            )
+        if self._total and self._total + count > limits.queue_observations:
+            raise Unavailable(f"{self._total} observations are waiting to be written", retry_after_s=2)
+        if self._backlog(batch.room) > limits.fold_backlog:
+            raise Unavailable(f"the belief of room {batch.room} is behind its log", retry_after_s=5)
+
+    def _next_group(self) -> list[_Waiting]:
+        group: list[_Waiting] = []
+        room_left = _GROUP
+        while self._queue and (not group or len(self._queue[0].batch.items) <= room_left):
+            group.append(self._queue.popleft())
+            room_left -= len(group[-1].batch.items)
+        return group
+
+    def _hold(self, batch: Batch, sign: int) -> None:
+        self._total += sign * len(batch.items)
+        self._held[batch.agent] += sign * len(batch.items)
+        if not self._held[batch.agent]:
+            del self._held[batch.agent]

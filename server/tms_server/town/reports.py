@@ -1,0 +1,69 @@
+"""What agents report beside events: zone reads, poses of their own mover, the state of their device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field, TypeAdapter
+
+from tms_schemas.events import LabelMoved, MoverEntered, TagMissed, TagObserved
+from tms_schemas.observation import AgentState, PoseReport, RawRead
+from tms_schemas.rooms import Zone
+from tms_server.log.record import Record
+from tms_server.town.geometry import inside
+
+if TYPE_CHECKING:
+    from tms_server.town.fold import RoomFold
+
+_report: TypeAdapter[RawRead | PoseReport | AgentState] = TypeAdapter(
+    Annotated[RawRead | PoseReport | AgentState, Field(discriminator="type")]
+)
+
+
+def apply(fold: RoomFold, record: Record) -> None:
+    match _report.validate_json(record.body):
+        case RawRead() as read:
+            _zone_read(fold, read)
+        case PoseReport() as report:
+            _pose(fold, report)
+        case AgentState(state=state):
+            fold.state.agents[record.agent] = fold.state.agents[record.agent]._replace(state=state)
+
+
+def _zone_read(fold: RoomFold, read: RawRead) -> None:
+    """Expand the antenna's zone to the labels in it now: the tag is at one of them, or none of its tags was seen."""
+    zone = _zone(fold, read.zone)
+    if zone is None:
+        fold.note("unknown_zone", f"agent {fold.record.agent} has no zone {read.zone!r} in this room")
+        return
+    within = [name for name, info in fold.state.labels.items() if not info.ghost and inside(info.xy, zone.polygon)]
+    if read.tag is not None:
+        fold.read(read.tag, None)
+        if within:
+            fold.fold(TagObserved(labels=within, tag=read.tag))
+        elif read.tag in fold.state.names:
+            fold.note("empty_zone", f"{read.tag} was read in zone {read.zone!r}, where there is no label")
+        return
+    if within:
+        for tag, places in fold.engine.marginals().items():
+            if any(name in places for name in within):
+                fold.fold(TagMissed(labels=within, tag=tag))
+
+
+def _zone(fold: RoomFold, zone_id: str) -> Zone | None:
+    room, agent = fold.state.room, fold.record.agent
+    sensors = room.sensors if room is not None else []
+    zones = (zone for sensor in sensors if sensor.agent == agent for zone in sensor.zones)
+    return next((zone for zone in zones if zone.id == zone_id), None)
+
+
+def _pose(fold: RoomFold, report: PoseReport) -> None:
+    """The agent's own mover is there, whether or not it was announced."""
+    x, y, theta = report.pose
+    if report.label in fold.state.labels:
+        fold.fold(LabelMoved(label=report.label, xy=(x, y)))
+    else:
+        fold.fold(MoverEntered(label=report.label, xy=(x, y)))
+    info = fold.state.active(report.label)
+    if info is not None:
+        fold.state.labels[report.label] = info._replace(theta=theta)
