@@ -134,8 +134,8 @@ class Link(Generic[T]):
         self._retry = retry or Retry(first_s=0.2, cap_s=10.0)
         self._state: DeviceState | None = None
 
-    async def listen(self) -> AsyncGenerator[T | DeviceState, None]:
-        """Readings, and the state whenever it changes."""
+    async def listen(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
+        """Readings in the groups they arrive in, and the state whenever it changes."""
         failures = 0
         while True:
             try:
@@ -152,7 +152,7 @@ class Link(Generic[T]):
             failures += 1
             await asyncio.sleep(self._retry.pause(failures))
 
-    async def _connection(self) -> AsyncGenerator[T | DeviceState, None]:
+    async def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
         stream = await self._open()
         session = self._session()
         clock = asyncio.get_running_loop().time
@@ -175,8 +175,8 @@ class Link(Generic[T]):
                         yield state
                     if clock() - alive > 3 * self._silent_after_s:
                         raise DeviceFault(f"nothing for {3 * self._silent_after_s:g} s")
-                for item in items:
-                    yield item
+                if items:
+                    yield items
                 session.tick()
                 stream.write(session.output())
         finally:

@@ -38,12 +38,13 @@ async def until(link: Link[TagRead], wanted, act=None, timeout_s: float = 8.0) -
     """Listen until an item satisfies ``wanted``; all items so far. ``act`` is called after each item."""
     seen: list[TagRead | DeviceState] = []
     async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
-        async for item in items:
-            seen.append(item)
-            if wanted(item, seen):
-                return seen
-            if act:
-                act(item)
+        async for arrived in items:
+            for item in [arrived] if isinstance(arrived, DeviceState) else arrived:
+                seen.append(item)
+                if wanted(item, seen):
+                    return seen
+                if act:
+                    act(item)
     raise AssertionError("the link ended")
 
 

@@ -53,14 +53,11 @@ class Parameter:
         return value
 
     def hex(self, name: str) -> str:
-        """A byte or bit field as upper-case hex; a bit field has one digit per four bits begun."""
+        """The bytes of a byte or bit field as upper-case hex."""
         value = self.values[name]
-        if isinstance(value, bytes):
-            return value.hex().upper()
-        assert isinstance(value, tuple)
-        count, raw = value
+        raw = value[1] if isinstance(value, tuple) else value
         assert isinstance(raw, bytes)
-        return raw.hex().upper()[: (count + 3) // 4]
+        return raw.hex().upper()
 
 
 @dataclass(frozen=True, slots=True)
