@@ -20,8 +20,8 @@ def tag_reads(message: Message) -> list[TagRead]:
             tag=epc,
             antenna=found.number("AntennaID") if (found := report.find("AntennaID")) else 0,
             rssi_dbm=float(found.number("PeakRSSI")) if (found := report.find("PeakRSSI")) else None,
-            first_seen=_time(report, "FirstSeenTimestampUTC"),
-            last_seen=_time(report, "LastSeenTimestampUTC"),
+            first_seen=time_of(report, "FirstSeenTimestampUTC"),
+            last_seen=time_of(report, "LastSeenTimestampUTC"),
             count=found.number("TagCount") if (found := report.find("TagSeenCount")) else 1,
         )
         for report in message.all("TagReportData")
@@ -128,7 +128,8 @@ def _epc(report: Parameter) -> str:
     return found.hex("EPC") if found else ""
 
 
-def _time(report: Parameter, name: str) -> datetime | None:
+def time_of(report: Parameter, name: str) -> datetime | None:
+    """Time of a child that holds microseconds since 1970, None where there is none."""
     found = report.find(name)
     if found is None:
         return None

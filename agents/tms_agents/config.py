@@ -1,0 +1,80 @@
+"""What every agent's TOML file says: who it is, where it posts, where its spool lies."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo
+from pydantic.functional_validators import AfterValidator
+
+from tms_client.cli import CommandError
+from tms_client.commands.options import DEFAULT_URL
+from tms_schemas.base import AgentId, RoomId
+
+
+class Section(BaseModel):
+    """Base of all sections: a misspelt name is an error, not a silent default."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
+    folder = (info.context or {}).get("folder", Path())
+    return Path(folder) / path.expanduser()
+
+
+#: A path; relative ones start at the folder of the configuration file.
+LocalPath = Annotated[Path, AfterValidator(_beside_the_file)]
+Seconds = Annotated[float, Field(gt=0, le=86_400)]
+
+
+class Server(Section):
+    """``TMS_URL`` and ``TMS_KEY`` of the environment win over the file, so that keys can stay out of it."""
+
+    url: str = Field(default=DEFAULT_URL, pattern=r"^https?://\S+$")
+    key: str | None = None
+    batch: Annotated[int, Field(ge=1, le=1000)] = 500
+    linger_s: Annotated[float, Field(ge=0, le=60)] = 0.1
+
+
+class SpoolSection(Section):
+    path: LocalPath
+    max_items: Annotated[int, Field(ge=1)] = 200_000
+    max_bytes: Annotated[int, Field(ge=1000)] = 64_000_000
+
+
+class AgentConfig(Section):
+    agent: AgentId
+    room: RoomId
+    server: Server = Server()
+    spool: SpoolSection
+
+
+C = TypeVar("C", bound=AgentConfig)
+
+
+def read_config(path: Path, model: type[C]) -> C:
+    """Read and validate a configuration file.
+
+    Raises:
+        CommandError: the file is missing, no TOML, or says something wrong (named with its place).
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise CommandError(f"{path}: {error}") from error
+    _from_environment(raw)
+    try:
+        return model.model_validate(raw, context={"folder": path.resolve().parent})
+    except ValidationError as error:
+        faults = (f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)[:5])
+        raise CommandError(f"{path}: {'; '.join(faults)}") from error
+
+
+def _from_environment(raw: dict[str, Any]) -> None:
+    given = {name: value for name in ("url", "key") if (value := os.environ.get(f"TMS_{name.upper()}"))}
+    if given and isinstance(raw.setdefault("server", {}), dict):
+        raw["server"] |= given
