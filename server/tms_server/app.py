@@ -21,6 +21,7 @@ from tms_server.keys.endpoints import router as keys_router
 from tms_server.keys.ring import KeyRing
 from tms_server.limits import BodyLimit
 from tms_server.live.endpoints import router as live_router
+from tms_server.live.feed import Feeds
 from tms_server.objects.endpoints import router as objects_router
 from tms_server.rooms.endpoints import router as rooms_router
 from tms_server.settings import Settings
@@ -38,6 +39,7 @@ class State(TypedDict):
     sessions: Sessions
     keys: KeyRing
     town: Town
+    feeds: Feeds
 
 
 def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
@@ -60,6 +62,7 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
                         sessions=sessions,
                         keys=KeyRing(sessions),
                         town=town,
+                        feeds=Feeds(town),
                     )
         finally:
             await engine.dispose()

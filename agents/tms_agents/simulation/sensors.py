@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TypeVar
 
 import numpy as np
 
 from tms_agents.simulation.world import Cabinet, Gripped, InCabinet, OnFloor, OnTable, World, Xy
 from tms_schemas.observation import (
+    AgentState,
     Inventory,
     InventoryLabel,
     LabelAppeared,
@@ -31,6 +32,8 @@ from tms_schemas.observation import (
 
 Seen = TypeVar("Seen", LabelAppeared, LabelVanished)
 
+#: An agent that has nothing to report says so often enough not to count as silent.
+SIGN_OF_LIFE = timedelta(seconds=10)
 #: A reader's round over its antennas: how long after the load cells it knows a tag.
 READ_S = 2.0
 #: A mover's position is reported after this way, and where it came to rest.
@@ -52,13 +55,27 @@ class SensorAgent(ABC):
         self._seq = 0
         self._new_label = new_label or self._count
 
-    @abstractmethod
     def start(self, world: World, now: datetime) -> list[Observation]:
         """The inventory of a device that was just switched on."""
+        self._heard = now
+        return [Inventory(seq=self._next_seq(), observed_at=now, labels=self._inventory(world))]
+
+    def look(self, world: World, now: datetime) -> list[Observation]:
+        """What changed since the last look; a sign of life where nothing did for long."""
+        found = self._changes(world, now)
+        if not found and now - self._heard >= SIGN_OF_LIFE:
+            found.append(AgentState(seq=self._next_seq(), observed_at=now, state="connected"))
+        if found:
+            self._heard = now
+        return found
 
     @abstractmethod
-    def look(self, world: World, now: datetime) -> list[Observation]:
-        """What changed since the last look."""
+    def _inventory(self, world: World) -> list[InventoryLabel]:
+        """All labels there are now."""
+
+    @abstractmethod
+    def _changes(self, world: World, now: datetime) -> list[Observation]:
+        """What changed since the last time, in order."""
 
     def _count(self) -> str:
         self._labels += 1
@@ -90,7 +107,7 @@ class CabinetAgent(SensorAgent):
         self._known: dict[int, tuple[str, str]] = {}  # slot -> (label, tag of the thing there)
         self._unread: dict[int, float] = {}  # slot -> world time at which its tag will have been read
 
-    def start(self, world: World, now: datetime) -> list[Observation]:
+    def _inventory(self, world: World) -> list[InventoryLabel]:
         labels = []
         for slot, tag in self._contents(world).items():
             self._known[slot] = (self._new_label(), tag)
@@ -104,9 +121,9 @@ class CabinetAgent(SensorAgent):
                     tag=tag,
                 )
             )
-        return [Inventory(seq=self._next_seq(), observed_at=now, labels=labels)]
+        return labels
 
-    def look(self, world: World, now: datetime) -> list[Observation]:
+    def _changes(self, world: World, now: datetime) -> list[Observation]:
         contents = self._contents(world)
         gone = [slot for slot, (_, tag) in self._known.items() if contents.get(slot) != tag]
         found: list[Observation] = [self._vanish(world, slot, now) for slot in gone]
@@ -163,7 +180,7 @@ class FloorAgent(SensorAgent):
         self._people: dict[str, tuple[str, Xy]] = {}  # person -> (label, position reported last)
         self._things: dict[str, tuple[str, Xy]] = {}  # the track of a thing -> (label, position)
 
-    def start(self, world: World, now: datetime) -> list[Observation]:
+    def _inventory(self, world: World) -> list[InventoryLabel]:
         labels = []
         for person, xy in self._visible_people(world).items():
             self._people[person] = (self._new_label(), xy)
@@ -171,9 +188,9 @@ class FloorAgent(SensorAgent):
         for thing, xy in self._visible_things(world).items():
             self._things[thing] = (self._new_label(), xy)
             labels.append(InventoryLabel(label=self._things[thing][0], kind="floor", xy=self._measured(xy, 0.01)))
-        return [Inventory(seq=self._next_seq(), observed_at=now, labels=labels)]
+        return labels
 
-    def look(self, world: World, now: datetime) -> list[Observation]:
+    def _changes(self, world: World, now: datetime) -> list[Observation]:
         things = self._visible_things(world)
         found: list[Observation] = []
         for thing in [thing for thing, (_, xy) in self._things.items() if things.get(thing) != xy]:
@@ -234,7 +251,7 @@ class RobotAgent(SensorAgent):
         self._gripped: tuple[str, str] | None = None  # (label, tag)
         self._put: dict[str, str] = {}  # tag -> label of what it has put on furniture
 
-    def start(self, world: World, now: datetime) -> list[Observation]:
+    def _inventory(self, world: World) -> list[InventoryLabel]:
         self._body, self._told = self._new_label(), world.movers[self._robot].xy
         labels = [InventoryLabel(label=self._body, kind="mover", xy=self._told)]
         tag = world.gripped_by(self._robot)
@@ -243,9 +260,9 @@ class RobotAgent(SensorAgent):
             labels.append(
                 InventoryLabel(label=self._gripped[0], kind="robot", xy=world.movers[self._robot].gripper, tag=tag)
             )
-        return [Inventory(seq=self._next_seq(), observed_at=now, labels=labels)]
+        return labels
 
-    def look(self, world: World, now: datetime) -> list[Observation]:
+    def _changes(self, world: World, now: datetime) -> list[Observation]:
         return [*self._released(world, now), *self._moved(world, now), *self._grasped(world, now)]
 
     def _released(self, world: World, now: datetime) -> list[Observation]:

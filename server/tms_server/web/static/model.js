@@ -34,17 +34,6 @@ export class Model {
     return (this.sensors.get(agent)?.kind ?? "").toLowerCase().startsWith("robot");
   }
 
-  /** How many objects a mover probably has: what it holds, and for a robot what its grippers hold. */
-  load(mover) {
-    let sum = mover.expected_objects;
-    for (const label of this.labels.values()) {
-      if (label.kind === "robot" && agentOf(label.label) === agentOf(mover.label)) {
-        for (const p of Object.values(label.contents)) sum += p;
-      }
-    }
-    return sum;
-  }
-
   /** People and robots in a fixed order, so that "person 2" stays person 2 while both are there. */
   people() {
     return this._sorted((mover) => !this.isRobot(mover));

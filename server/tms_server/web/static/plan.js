@@ -108,7 +108,7 @@ function newMover(one, model, colour) {
 function updateMover(node, one, model) {
   move(node, one.xy);
   node.classList.toggle("stale", one.stale);
-  const count = model.load(one);
+  const count = one.expected_objects;
   const words = `${moverInWords(model, one.label)} has ${count.toFixed(1)} objects`;
   text(node.querySelector("title"), words);
   text(node.querySelector(".count text"), String(Math.round(count)));
