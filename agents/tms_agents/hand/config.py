@@ -54,7 +54,8 @@ class CaptureSource(Section):
     kind: Literal["capture"]
     format: Literal["llrp", "tr3"]
     path: LocalPath
-    #: Where the bytes carry no time: that of the first frame (default: now), and from one frame to the next.
+    #: Where the bytes carry no time: that of the first frame (default: when the file was written last), and the
+    #: seconds from one frame to the next.
     start: AwareDatetime | None = None
     frame_s: Annotated[float, Field(ge=0, le=3600)] = 0.1
 

@@ -39,7 +39,7 @@ async def arrivals(
     """Reports in groups, and states of the device, with the time of arrival. Ends only where a capture does."""
     source = config.source
     if isinstance(source, CaptureSource):
-        for arrival in _capture(source, now):
+        for arrival in _capture(source):
             yield arrival
         return
     own_clock = isinstance(source, LlrpSource) and source.reader_clock
@@ -81,13 +81,18 @@ def _seen(read: TagRead, at: datetime, own_clock: bool) -> Seen:
     return Seen(read, at, at)
 
 
-def _capture(source: CaptureSource, now: Callable[[], datetime]) -> Iterator[Arrival]:
+def _capture(source: CaptureSource) -> Iterator[Arrival]:
+    try:
+        written = datetime.fromtimestamp(source.path.stat().st_mtime, UTC)
+    except OSError as error:
+        raise CommandError(f"capture {source.path}: {error.strerror}") from error
     groups = _llrp_groups(source.path) if source.format == "llrp" else _tr3_groups(source.path)
-    at = (source.start or now()).astimezone(UTC)
+    at = (source.start or written).astimezone(UTC)
     step = timedelta(seconds=source.frame_s)
     connected = False
     for stamp, reads in groups:
-        at = stamp or at
+        if stamp is not None:
+            at = max(at, stamp) if connected else stamp
         if not connected:
             connected = True
             yield at, DeviceState("connected", f"capture {source.path.name}")

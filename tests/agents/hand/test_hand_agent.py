@@ -1,0 +1,206 @@
+"""``tms agent hand`` from reader bytes to the unknown-tag list of a real server."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import signal
+import subprocess
+import sys
+import time
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from tms_agents.config import read_config
+from tms_agents.devices.llrp import messages
+from tms_agents.devices.llrp.codec import Parameter, encode
+from tms_agents.devices.llrp.emulator import LlrpEmulator
+from tms_agents.devices.tags import TagRead
+from tms_agents.devices.tr3.codec import Frame
+from tms_agents.devices.tr3.emulator import PtyLine, Tr3Device
+from tms_agents.hand.config import HandConfig
+from tms_client import Spool, cli
+
+EPC, OTHER = "30352B2E4401D3000000007B", "300833B2DDD9CAFEBABE8001"
+UID = "E00401004E17F97A"
+ZERO = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+def capture(*reports: tuple[str, int, float, float]) -> bytes:
+    """An LLRP conversation: greeting, then one report per (tag, antenna, first second, last second)."""
+    hello = messages.event(ZERO, Parameter("ConnectionAttemptEvent", {"Status": 0}))
+    reads = [
+        TagRead(tag=tag, antenna=antenna, first_seen=ZERO + timedelta(seconds=a), last_seen=ZERO + timedelta(seconds=b))
+        for tag, antenna, a, b in reports
+    ]
+    bodies = [hello, *(messages.report([read]) for read in reads)]
+    return b"".join(encode(dataclasses.replace(body, id=n)) for n, body in enumerate(bodies))
+
+
+def counts(town, room) -> dict[str, int]:
+    return {one.tag: one.count for one in town.unknown_tags(room)}
+
+
+REPORTS = [(EPC, 1, 0, 1), (EPC, 1, 2, 3), (EPC, 1, 60, 61), (OTHER, 2, 5, 5)]
+
+
+@pytest.mark.parametrize(("mode", "expected"), [("visits", {EPC: 2, OTHER: 1}), ("reports", {EPC: 3, OTHER: 1})])
+def test_an_llrp_capture_once(town, room, configure, tmp_path, capsys, mode, expected):
+    (tmp_path / "x.bin").write_bytes(b"\xff\xff" + capture(*REPORTS) + b"\x04")
+    source = {"kind": "capture", "format": "llrp", "path": "x.bin"}
+    config = configure(source, visits={"count": mode})
+    assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+    assert counts(town, room) == expected
+    view = next(one for one in town.unknown_tags(room) if one.tag == EPC)
+    assert (view.first_seen, view.agent) == (ZERO, f"{room}-hand")
+    assert "4 reports of 2 tags" in capsys.readouterr().out
+    agent = town.agents.get(f"{room}-hand")
+    assert (agent.state, agent.missing, agent.next_seq) == ("silent", 0, sum(expected.values()) + 2)
+
+
+def test_running_again_is_a_new_observation_not_a_conflict(town, room, configure, tmp_path):
+    """The numbering continues, with the spool kept and with the spool lost."""
+    (tmp_path / "x.bin").write_bytes(capture(*REPORTS))
+    config = configure({"kind": "capture", "format": "llrp", "path": "x.bin"})
+    for expected in (2, 4, 6):
+        assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+        assert counts(town, room)[EPC] == expected
+        if expected == 4:
+            for file in tmp_path.glob("hand.spool*"):
+                file.unlink()
+
+
+def test_a_tr3_capture_once(town, room, configure, tmp_path):
+    frame = Frame(0x4C, bytes.fromhex(UID)[::-1] + bytes(16)).encode()
+    (tmp_path / "x.bin").write_bytes(frame[9:] + frame * 5 + frame[:20])
+    config = configure({"kind": "capture", "format": "tr3", "path": "x.bin"})
+    assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+    assert counts(town, room) == {UID: 1}
+
+
+def test_antennas_may_be_zones_of_their_own(town, room, configure, tmp_path):
+    (tmp_path / "x.bin").write_bytes(capture((EPC, 1, 0, 0), (EPC, 2, 1, 1), (EPC, 7, 1, 1)))
+    source = {"kind": "capture", "format": "llrp", "path": "x.bin"}
+    config = configure(source, zone="hand", zones={"1": "left", "2": "right"})
+    assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+    assert counts(town, room) == {EPC: 3}
+
+
+def test_a_tag_too_long_for_the_wire_does_not_stop_the_others(town, room, configure, tmp_path, caplog):
+    (tmp_path / "x.bin").write_bytes(capture(("AB" * 40, 1, 0, 0), (EPC, 1, 0, 0)))
+    config = configure({"kind": "capture", "format": "llrp", "path": "x.bin"})
+    assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+    assert counts(town, room) == {EPC: 1}
+    assert "more than 64 digits" in caplog.text
+
+
+def test_a_file_without_frames_makes_the_agent_faulty(town, room, configure, tmp_path):
+    (tmp_path / "x.bin").write_bytes(b"nothing of the kind")
+    config = configure({"kind": "capture", "format": "llrp", "path": "x.bin"})
+    assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+    assert counts(town, room) == {}
+
+
+def test_without_a_server_everything_waits_in_the_spool(town, room, configure, tmp_path, capsys):
+    (tmp_path / "x.bin").write_bytes(capture(*REPORTS))
+    source = {"kind": "capture", "format": "llrp", "path": "x.bin"}
+    config = configure(source, url="http://127.0.0.1:9")
+    assert cli.main(["agent", "hand", "--config", str(config), "--once", "--timeout", "0.3"]) == 1
+    assert "5 waiting in the spool (GET /v1/agents/" in capsys.readouterr().out
+    config = configure(source | {"path": "empty.bin"})
+    (tmp_path / "empty.bin").write_bytes(b"")
+    assert cli.main(["agent", "hand", "--config", str(config), "--once"]) == 0
+    assert counts(town, room) == {EPC: 2, OTHER: 1}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"kind": "capture", "format": "llrp", "path": "absent.bin"}, "No such file"),
+        ({"kind": "capture", "format": "llrp"}, "source.capture.path: Field required"),
+        ({"kind": "laser"}, "source: Input tag 'laser'"),
+        ({"kind": "capture", "format": "llrp", "path": "x", "colour": 1}, "colour: Extra inputs are not permitted"),
+        ({"kind": "llrp", "host": "h"}, "--once needs a source of kind capture"),
+    ],
+)
+def test_a_wrong_configuration_is_one_line(configure, capsys, change, says):
+    assert cli.main(["agent", "hand", "--config", str(configure(change)), "--once"]) == 2
+    error = capsys.readouterr().err.splitlines()
+    assert says in error[-1] and error[-1].startswith("tms: ")
+
+
+def test_unknown_kind_and_missing_file(capsys, tmp_path):
+    assert cli.main(["agent", "nose", "--config", "x"]) == 2
+    assert cli.main(["agent", "hand", "--config", str(tmp_path / "absent.toml")]) == 2
+    assert [line[:5] for line in capsys.readouterr().err.splitlines()] == ["tms: "] * 2
+
+
+@pytest.mark.parametrize("name", ["llrp", "tr3", "capture"])
+def test_the_examples_are_valid(name):
+    import tms_agents.hand
+
+    path = Path(tms_agents.hand.__file__).parent / "examples" / f"{name}.toml"
+    assert read_config(path, HandConfig).room == "living-room"
+
+
+def test_the_key_comes_from_the_environment(configure, monkeypatch):
+    monkeypatch.setenv("TMS_KEY", "from the environment")
+    assert read_config(configure({"kind": "llrp", "host": "h"}), HandConfig).server.key == "from the environment"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+async def test_a_live_reader_until_a_signal(town, room, configure, number):
+    """Tags at an emulated reader reach the server; the agent ends in order and says so."""
+    async with LlrpEmulator(period_s=0.02) as reader:
+        reader.see(EPC)
+        config = configure({"kind": "llrp", "host": "127.0.0.1", "port": reader.port, "keepalive_s": 0.2})
+        agent = subprocess.Popen(
+            [sys.executable, "-m", "tms_client", "agent", "hand", "--config", str(config)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        await _until(lambda: counts(town, room) == {EPC: 1})
+        assert town.agents.get(f"{room}-hand").state == "connected"
+        reader.see(OTHER)
+        await _until(lambda: counts(town, room) == {EPC: 1, OTHER: 1})
+        agent.send_signal(number)
+        out, err = await asyncio.to_thread(agent.communicate, timeout=10)
+        assert agent.returncode == 0 and "0 waiting" in out and "Traceback" not in err
+    assert town.agents.get(f"{room}-hand").state == "silent"
+    assert town.agents.get(f"{room}-hand").missing == 0
+
+
+async def test_a_reader_that_fails_is_shown_faulty_within_seconds(town, room, configure):
+    device = Tr3Device()
+    device.see(UID)
+    async with PtyLine(device) as line:
+        source = {"kind": "tr3-serial", "device": line.path, "poll_s": 0.05}
+        config = configure(source, silent_after_s=0.5)
+        agent = subprocess.Popen(
+            [sys.executable, "-m", "tms_client", "agent", "hand", "--config", str(config)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            await _until(lambda: counts(town, room) == {UID: 1})
+            device.silent = True
+            began = time.monotonic()
+            await _until(lambda: town.agents.get(f"{room}-hand").state != "connected")
+            assert time.monotonic() - began < 5
+            device.silent = False
+            await _until(lambda: town.agents.get(f"{room}-hand").state == "connected")
+        finally:
+            agent.kill()
+            agent.wait()
+    # killed, not asked to stop: the spool opens again
+    with Spool(config.parent / "hand.spool", f"{room}-hand") as spool:
+        assert spool.next_seq is not None
+
+
+async def _until(true, timeout_s: float = 20.0) -> None:
+    async with asyncio.timeout(timeout_s):
+        while not await asyncio.to_thread(true):
+            await asyncio.sleep(0.05)
