@@ -64,9 +64,9 @@ def hand_over(world: World) -> Script:
 
 def carry_to_table(world: World) -> Script:
     yield from walk(world, ROBOT, "meeting", "table side")
-    world.movers[ROBOT].face((3.9, 3.0))
+    world.movers[ROBOT].face((4.3, 2.5))
     yield from wait(world, 0.5)
-    world.set_down(ROBOT, TABLE_SURFACE, (3.9, 2.5))
+    world.set_down(ROBOT, TABLE_SURFACE, (4.3, 2.5))
     yield from wait(world, 0.8)
 
 

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TypeVar
 
+from tms_schemas.base import Model
 from tms_schemas.belief import LabelView, MoverView, ObjectPlacement
 from tms_schemas.live import SnapshotFrame, StateFrame
 from tms_server.town.views import RoomView
 
 Part = TypeVar("Part", ObjectPlacement, LabelView, MoverView)
 _CACHED = 32
+#: Slices below this are not drawn and do not count as moved.
+_UNSEEN = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +116,25 @@ class Encoder:
 
 
 def _shared(parts: dict[str, Part], before: Mapping[str, Part]) -> dict[str, Part]:
-    return {key: old if (old := before.get(key)) == part and old is not None else part for key, part in parts.items()}
+    return {
+        key: old if (old := before.get(key)) is not None and _same(part, old) else part for key, part in parts.items()
+    }
+
+
+def _same(new: Model, old: Model) -> bool:
+    if isinstance(new, ObjectPlacement) and isinstance(old, ObjectPlacement):
+        return _same_pie(new, old)
+    return new == old
+
+
+def _same_pie(new: ObjectPlacement, old: ObjectPlacement) -> bool:
+    """Equal, or only slices moved that nobody sees: else all pies would come anew with every step of a walker."""
+    if new == old:
+        return True
+    if new.name != old.name or len(new.distribution) != len(old.distribution):
+        return False
+    pairs = zip(new.distribution, old.distribution, strict=True)
+    return all(a == b or (a.label == b.label and a.p == b.p and a.p < _UNSEEN) for a, b in pairs)
 
 
 def _changed(new: Mapping[str, Part], old: Mapping[str, Part]) -> list[Part]:

@@ -4,7 +4,7 @@ import { mark, person, robot } from "./marks.js";
 import { html, keyed, set, svg, text } from "./svg.js";
 import { mover as moverInWords, percent } from "./words.js";
 
-const MARGIN = 22;
+const MARGIN = 34;
 /** Names are written beside labels of these kinds; in a cabinet they would cover each other. */
 const NAMED = new Set(["floor", "table", "robot"]);
 
@@ -28,15 +28,13 @@ export class Plan {
 
   /** Draw what stands still. */
   furnish(room) {
-    const xs = room.outline.map(([x]) => 100 * x);
-    const ys = room.outline.map(([, y]) => -100 * y);
-    const [x0, y0] = [Math.min(...xs) - MARGIN, Math.min(...ys) - MARGIN];
+    const { x0, y0, x1, y1 } = box(room.outline);
     set(this._root, {
-      viewBox: `${x0} ${y0} ${Math.max(...xs) + MARGIN - x0} ${Math.max(...ys) + MARGIN - y0}`,
+      viewBox: `${x0 - MARGIN} ${y0 - MARGIN} ${x1 - x0 + 2 * MARGIN} ${y1 - y0 + 2 * MARGIN}`,
       "aria-label": `Floor plan of ${room.name}`,
     });
     this._ground.replaceChildren(svg("polygon", { class: "walls", points: points(room.outline) }));
-    for (const one of room.furniture) this._ground.append(furniture(one));
+    for (const one of room.furniture) this._ground.append(furniture(one, room));
     for (const group of [this._labels, this._movers, this._names]) group.replaceChildren();
   }
 
@@ -72,18 +70,37 @@ export class Plan {
   }
 }
 
-function furniture(one) {
-  const xs = one.polygon.map(([x]) => 100 * x);
-  const ys = one.polygon.map(([, y]) => -100 * y);
-  const [width, height] = [Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)];
-  const [cx, cy] = [(Math.max(...xs) + Math.min(...xs)) / 2, (Math.max(...ys) + Math.min(...ys)) / 2];
-  const upright = height > 1.8 * width;
-  // Marks of a cabinet are on its middle line; its name stands beside that.
-  const [dx, dy] = !one.agent ? [0, 0] : upright ? [-width / 2 - 9, 0] : [0, height / 2 + 15];
-  const turn = upright && one.agent ? ` rotate(-90)` : "";
+function furniture(one, room) {
+  const transform = one.agent ? besideWall(box(one.polygon), box(room.outline)) : middle(box(one.polygon));
   return svg("g", { class: one.agent ? "furniture smart" : "furniture", "data-furniture": one.id },
-    svg("polygon", { points: points(one.polygon) }),
-    svg("text", { transform: `translate(${cx + dx} ${cy + dy})${turn}` }, one.name));
+    svg("polygon", { points: points(one.polygon) }), svg("text", { transform }, one.name));
+}
+
+/** Marks lie on a cabinet and people stand before it: its name goes to the other side of the wall, if it has one. */
+function besideWall(own, room) {
+  const gaps = { top: own.y0 - room.y0, right: room.x1 - own.x1, bottom: room.y1 - own.y1, left: own.x0 - room.x0 };
+  const wide = own.x1 - own.x0 >= own.y1 - own.y0;
+  const sides = wide ? ["top", "bottom", "right", "left"] : ["right", "left", "top", "bottom"];
+  const side = sides.find((name) => gaps[name] < 40);
+  const [cx, cy] = [(own.x0 + own.x1) / 2, (own.y0 + own.y1) / 2];
+  const off = 17;
+  switch (side) {
+    case "top": return `translate(${cx} ${room.y0 - off})`;
+    case "bottom": return `translate(${cx} ${room.y1 + off})`;
+    case "right": return `translate(${room.x1 + off} ${cy}) rotate(90)`;
+    case "left": return `translate(${room.x0 - off} ${cy}) rotate(-90)`;
+    default: return `translate(${cx} ${own.y1 + 15})`;
+  }
+}
+
+function middle(own) {
+  return `translate(${(own.x0 + own.x1) / 2} ${(own.y0 + own.y1) / 2})`;
+}
+
+function box(polygon) {
+  const xs = polygon.map(([x]) => 100 * x);
+  const ys = polygon.map(([, y]) => -100 * y);
+  return { x0: Math.min(...xs), x1: Math.max(...xs), y0: Math.min(...ys), y1: Math.max(...ys) };
 }
 
 function updateLabel(node, one, model) {
