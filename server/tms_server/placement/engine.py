@@ -25,7 +25,7 @@ from tms_schemas.events import (
     Tick,
     Transfer,
 )
-from tms_server.placement import moves, readings, transfers
+from tms_server.placement import kernels, moves, readings, transfers
 from tms_server.placement.initial import starting_hypotheses
 from tms_server.placement.labels import OUT_SLOT, Labels, starting_labels
 from tms_server.placement.objects import ObjectTable
@@ -91,6 +91,7 @@ class Engine:
         self._parameters = parameters
         self._objects = ObjectTable(objects, parameters)
         self._labels = starting_labels(tuple(labels))
+        self._pies: list[dict[str, float]] | None = None
         # Lost over kept mass, bounded from above (rule 13); infinite once resampled.
         self._lost = 0.0
         self._belief, complete = starting_hypotheses(initial, self._objects, self._labels, budget)
@@ -107,6 +108,8 @@ class Engine:
         """
         if isinstance(event, Tick):
             return self._info(0.0, False, frozenset(), 0.0, False)
+        if not isinstance(event, LabelMoved):
+            self._pies = None
         world = World(self._parameters, self._objects, self._labels, self._belief)
         if isinstance(event, LabelAppeared):
             steps = transfers.appeared(world, event, p_jump)
@@ -181,9 +184,19 @@ class Engine:
         slot = self._belief.pinned[i]
         if slot >= 0:
             return {self._labels.name(int(slot)): 1.0}
-        row = self._belief.marginals(self._labels.n_slots)[self._belief.col_of[i]].tolist()
+        if self._pies is None:
+            self._pies = self._count_pies()
+        return dict(self._pies[self._belief.col_of[i]])
+
+    def _count_pies(self) -> list[dict[str, float]]:
+        """The marginals of every object in play, in the order of its column."""
+        p = kernels.marginals(self._belief.rows, self._belief.w, self._labels.n_slots)
+        pies: list[dict[str, float]] = [{} for _ in range(p.shape[0])]
+        columns, slots = np.nonzero(p >= NEGLIGIBLE)
         name = self._labels.name
-        return {name(s): p for s, p in enumerate(row) if p >= NEGLIGIBLE}
+        for k, slot, share in zip(columns.tolist(), slots.tolist(), p[columns, slots].tolist(), strict=True):
+            pies[k][name(slot)] = share
+        return pies
 
     @property
     def labels(self) -> Mapping[str, LabelState]:
@@ -230,14 +243,14 @@ class Engine:
     def add_object(self, spec: ObjectSpec) -> None:
         """Track one more object; it starts at OUT. ValueError if its id or tag is taken."""
         self._objects = ObjectTable((*self._objects.specs, spec), self._parameters)
-        b = self._belief
+        b, self._pies = self._belief, None
         self._belief = Hypotheses(b.rows, b.w, b.cols, np.append(b.pinned, np.int32(OUT_SLOT)))
 
     def remove_object(self, object_id: str) -> None:
         """Forget an object: the belief is marginalised over it. KeyError if it is unknown."""
         i = self._objects.index[object_id]
         specs = [s for s in self._objects.specs if s.id != object_id]
-        b = self._belief
+        b, self._pies = self._belief, None
         keep = b.cols != i
         cols = b.cols[keep] - (b.cols[keep] > i).astype(np.int32)
         rows = np.ascontiguousarray(b.rows[:, keep])
@@ -263,6 +276,7 @@ class Engine:
         twin = Engine.__new__(Engine)
         twin.budget, twin._parameters, twin._objects = self.budget, self._parameters, self._objects
         twin._labels, twin._belief, twin._lost = self._labels.copy(), self._belief.copy(), self._lost
+        twin._pies = self._pies
         return twin
 
     def to_bytes(self) -> bytes:
@@ -282,7 +296,7 @@ class Engine:
         """The engine that ``to_bytes`` wrote. ValueError if the bytes are damaged or of another version."""
         header, arrays = unpack("engine", data)
         engine = cls.__new__(cls)
-        engine.budget = header["budget"]
+        engine.budget, engine._pies = header["budget"], None
         engine._parameters = Parameters.of(header["parameters"])
         engine._objects = ObjectTable([ObjectSpec(**o) for o in header["objects"]], engine._parameters)
         engine._labels = Labels.from_json(header["labels"])

@@ -321,28 +321,6 @@ def _same(rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any,
 
 
 @njit(cache=True)
-def child_marginals(
-    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, cw: Any, slots: int
-) -> Any:
-    """Marginals of the objects in play over the children: [K, S]. Objects that leave a pinned place are not in it."""
-    by_parent = np.zeros(rows.shape[0])
-    for c in range(parent.shape[0]):
-        by_parent[parent[c]] += cw[c]
-    p = np.zeros((cols.shape[0], slots))
-    for h in range(rows.shape[0]):
-        if by_parent[h] > 0.0:
-            for k in range(cols.shape[0]):
-                p[k, rows[h, k]] += by_parent[h]
-    for c in range(parent.shape[0]):
-        if obj[c] >= 0:
-            k = col_of[obj[c]]
-            if k >= 0:
-                p[k, rows[parent[c], k]] -= cw[c]
-                p[k, to[c]] += cw[c]
-    return p
-
-
-@njit(cache=True)
 def build(rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any) -> Any:
     """Write the children out as rows; objects that became certain leave play, those that are not any more enter it.
 
@@ -374,7 +352,6 @@ def build(rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any,
         source[k] = col_of[entering[k]]
     for k in range(most):
         col_of[entering[k]] = k
-    # Copy column-wise only what is certain to be needed: first find the columns that vary.
     full = np.empty((n, most), I32)
     for c in range(n):
         h = parent[c]

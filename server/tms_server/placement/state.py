@@ -34,7 +34,6 @@ class Hypotheses:
         self.col_of = np.full(pinned.size, -1, np.int32)
         self.col_of[cols] = np.arange(cols.size, dtype=np.int32)
         self.zob: Array = kernels.hashes(rows, cols)
-        self._marginals: Array | None = None
 
     @classmethod
     def certain(cls, pinned: Array) -> Hypotheses:
@@ -45,17 +44,11 @@ class Hypotheses:
         """Independent of this one; arrays that are never written in place are shared."""
         twin = Hypotheses.__new__(Hypotheses)
         twin.rows, twin.w, twin.zob, twin.cols = self.rows, self.w, self.zob, self.cols
-        twin.pinned, twin.col_of, twin._marginals = self.pinned.copy(), self.col_of.copy(), self._marginals
+        twin.pinned, twin.col_of = self.pinned.copy(), self.col_of.copy()
         return twin
 
     def __len__(self) -> int:
         return int(self.w.size)
-
-    def marginals(self, slots: int) -> Array:
-        """Probability of every slot for every object in play: [K, S]."""
-        if self._marginals is None or self._marginals.shape[1] < slots:
-            self._marginals = kernels.marginals(self.rows, self.w, slots)
-        return self._marginals
 
     def column(self, obj: int) -> Array:
         """The slot of one object under every hypothesis, [H]."""
@@ -97,7 +90,6 @@ class Hypotheses:
             parent, obj, to, zob = parent[keep], obj[keep], to[keep], zob[keep]
         self.rows, self.cols, touched = kernels.build(rows, self.cols, self.col_of, self.pinned, parent, obj, to)
         self.w, self.zob = w, zob
-        self._marginals = None
         return total, touched
 
     def unpin(self, objects: Array) -> None:
@@ -110,7 +102,6 @@ class Hypotheses:
         self.cols, self.rows = order[by_object], np.ascontiguousarray(rows[:, by_object])
         self.pinned[objects] = -1
         self.col_of[self.cols] = np.arange(self.cols.size, dtype=np.int32)
-        self._marginals = None
 
     def everything(self) -> Children:
         """The present set as children in which nothing moved."""

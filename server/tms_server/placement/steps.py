@@ -7,6 +7,7 @@ yield.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
 from typing import NamedTuple
 
@@ -50,11 +51,13 @@ class World(NamedTuple):
 
     def log_kernels(self, movers: list[int], xy: tuple[float, float]) -> tuple[Array, Array]:
         """Log of K and "inside the gate" (1 or 0) of each mover, seen from ``xy`` (m)."""
-        at = np.array([self.labels[m].xy for m in movers], np.float64).reshape(-1, 2)
-        d2 = ((at - np.asarray(xy, np.float64)) ** 2).sum(axis=1)
+        x, y = xy
+        # A room has few movers: plain floats are faster than arrays here.
+        d2 = [(at[0] - x) ** 2 + (at[1] - y) ** 2 for at in (self.labels[m].xy for m in movers)]
+        scale = -0.5 / self.parameters.sigma_m**2
         gate = self.parameters.gate_m
-        near = np.ones(len(movers), np.int64) if gate is None else (np.sqrt(d2) <= gate).astype(np.int64)
-        return d2 / (-2.0 * self.parameters.sigma_m**2), near
+        near = [1 if gate is None or math.sqrt(d) <= gate else 0 for d in d2]
+        return np.array([d * scale for d in d2], np.float64), np.array(near, np.int64)
 
 
 Steps = Generator[Step, bool, None]
