@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tms_client.api import Api
-from tms_client.errors import BadRequest, Busy, Conflict, Invalid, NotFound, Refused, TooLarge, TownError, Unreachable
+from tms_client.errors import BadRequest, Busy, Conflict, Invalid, Refused, TooLarge, TownError, Unreachable
 from tms_client.flows import NO_RETRY, Flow, Retry, Wait
 from tms_client.spool import Item, Spool
 from tms_schemas.observation import MAX_BATCH
@@ -84,14 +84,10 @@ class Delivery:
 
     def _agree(self) -> Flow[None]:
         """Learn which numbers the server has seen, in case this spool is new or an old copy."""
-        try:
-            view = yield from self._api.agent(self.spool.agent)
-        except NotFound:
-            self.spool.continue_at(0)
-        else:
-            # Labels of a lost spool: beyond one per millisecond up to the agent's last sign of life.
-            seen = 0.0 if view.last_seen is None else view.last_seen.timestamp()
-            self.spool.continue_at(view.next_seq, int(seen * 1000) + 1)
+        view = yield from self._api.agent(self.spool.agent)
+        # Labels of a lost spool: beyond one per millisecond up to the agent's last sign of life.
+        seen = 0.0 if view.last_seen is None else view.last_seen.timestamp()
+        self.spool.continue_at(view.next_seq, int(seen * 1000) + 1)
         self._agreed = True
 
     def _sort_out(self, items: list[Item], refused: Refused) -> None:

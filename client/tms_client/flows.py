@@ -11,7 +11,6 @@ import email.utils
 import random
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from typing import TypeVar
 
 import httpx
@@ -118,7 +117,7 @@ def nothing(_: httpx.Response) -> None:
 
 def _error(call: Call, outcome: Outcome) -> TownError:
     if isinstance(outcome, httpx.Response):
-        return refusal(_problem(outcome), retry_after_s=_retry_after(outcome.headers.get("Retry-After")))
+        return refusal(_problem(outcome), retry_after_s=_retry_after(outcome.headers))
     if isinstance(outcome, httpx.TransportError) and not isinstance(
         outcome, httpx.UnsupportedProtocol | httpx.LocalProtocolError
     ):
@@ -135,19 +134,18 @@ def _problem(response: httpx.Response) -> Problem:
         return Problem(title=response.reason_phrase, status=response.status_code)
 
 
-def _retry_after(value: str | None) -> float | None:
-    """Seconds of a ``Retry-After`` header: delta-seconds or an HTTP date."""
-    if value is None:
-        return None
+def _retry_after(headers: httpx.Headers) -> float | None:
+    """Seconds of ``Retry-After``: delta-seconds, or an HTTP date seen from the date of the answer itself."""
+    value = headers.get("Retry-After", "")
     try:
         return max(0.0, float(value))
     except ValueError:
         pass
     try:
-        at = email.utils.parsedate_to_datetime(value)
-    except ValueError:
+        at, sent = (email.utils.parsedate_to_datetime(text) for text in (value, headers.get("Date", "")))
+        return max(0.0, (at - sent).total_seconds())
+    except (ValueError, TypeError):  # no date, or only one of them with a time zone
         return None
-    return max(0.0, (at - datetime.now(UTC)).total_seconds())
 
 
 def _first(error: ValidationError) -> str:

@@ -47,10 +47,15 @@ class Poster:
         self._wake.set()
 
     def drain(self, timeout_s: float = 30.0) -> bool:
-        """Send until nothing waits; False where that took too long. A pause between two tries is not cut short."""
+        """Send until nothing waits; False where that took too long."""
         deadline = time.monotonic() + timeout_s
+
+        def pause(seconds: float) -> None:
+            self._stop.wait(max(0.0, min(seconds, deadline - time.monotonic())))
+
         with self._one_at_a_time:
-            return self._connection.run(self._delivery.drain(lambda: time.monotonic() < deadline))
+            flow = self._delivery.drain(lambda: time.monotonic() < deadline)
+            return Connection(self._connection.http, pause).run(flow)
 
     def __enter__(self) -> Poster:
         self._thread = threading.Thread(target=self._run, name=f"poster of {self.spool.agent}", daemon=True)

@@ -84,10 +84,14 @@ class FakeTown:
 
     def _agent(self, agent: str) -> Response:
         seqs = [seq for name, seq in self.records if name == agent]
-        if not seqs:
-            return self._problem(404, "unknown agent")
-        seen = self.first_label.isoformat()
-        view = {"agent": agent, "room": "r", "next_seq": max(seqs) + 1, "first_seen": seen, "last_seen": seen}
+        seen = self.first_label.isoformat() if seqs else None
+        view = {
+            "agent": agent,
+            "room": "r",
+            "next_seq": max(seqs, default=-1) + 1,
+            "first_seen": seen,
+            "last_seen": seen,
+        }
         view |= {"last_observed_at": seen, "lag_s": 0.0, "missing": 0, "state": "connected"}
         return self._reply(200, {}, view)
 

@@ -38,7 +38,7 @@ def main(argv: Sequence[str]) -> int:
     except SpoolError as error:
         raise CommandError(str(error)) from error
     _say(config, tally)
-    return 1 if arguments.once and (tally.waiting or tally.buried) else 0
+    return 1 if arguments.once and (tally.waiting or tally.buried or tally.lost) else 0
 
 
 async def _until_signalled(config: HandConfig, once: bool, timeout_s: float) -> Tally:
@@ -65,6 +65,6 @@ def _progress() -> Callable[[Tally], None]:
 def _say(config: HandConfig, tally: Tally) -> None:
     sys.stdout.write(
         f"{config.agent}: {tally.reports} reports of {len(tally.tags)} tags, {tally.observations} observations, "
-        f"{tally.buried} refused by the server, {tally.waiting} waiting in the spool"
+        f"{tally.buried} refused by the server, {tally.lost} lost, {tally.waiting} waiting in the spool"
         f"{f' ({tally.trouble})' if tally.trouble else ''}\n"
     )

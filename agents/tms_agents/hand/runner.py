@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -12,7 +13,7 @@ from datetime import UTC, datetime
 from pydantic import ValidationError
 
 from tms_agents.devices.transport import DeviceState
-from tms_agents.hand.config import HandConfig
+from tms_agents.hand.config import CaptureSource, HandConfig
 from tms_agents.hand.sources import Seen, arrivals
 from tms_agents.hand.visits import Visits
 from tms_client import AsyncTown, Pace, Spool, SpoolFull
@@ -23,11 +24,16 @@ log = logging.getLogger(__name__)
 
 @dataclass(slots=True)
 class Tally:
-    """What a run did; ``unusable`` tags have ids that the wire cannot carry (longer than 64 hex digits)."""
+    """What a run did.
+
+    ``lost`` observations found the spool full; ``unusable`` tags have ids that the wire cannot carry (longer than 64
+    hex digits).
+    """
 
     reports: int = 0
     tags: set[str] = field(default_factory=set)
     observations: int = 0
+    lost: int = 0
     unusable: set[str] = field(default_factory=set)
     buried: int = 0
     waiting: int = 0
@@ -40,7 +46,7 @@ async def run(
     once: bool,
     drain_s: float,
     progress: Callable[[Tally], None] = lambda tally: None,
-    now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    clock: Callable[[], float] = time.time,
 ) -> Tally:
     """Work until the task is cancelled (or, with ``once``, a capture is at its end), then post what waits.
 
@@ -63,21 +69,25 @@ async def run(
         ):
             at = None
             with contextlib.suppress(asyncio.CancelledError):
-                async with contextlib.aclosing(arrivals(config, now)) as items:
+                async with contextlib.aclosing(arrivals(config, clock)) as items:
                     async for at, item in items:
                         observations = _observations(config, visits, tally, at, item)
                         try:
                             if observations:
                                 await poster.post(*observations)
                         except SpoolFull as full:
-                            log.error("%s; %d observations refused so far", full, spool.refused)
+                            if not tally.lost:
+                                log.error("%s; what is seen now is lost", full)
+                            tally.lost += len(observations)
                         else:
                             tally.observations += len(observations)
                         progress(tally)
                 if not once:
                     await asyncio.Event().wait()
             with contextlib.suppress(SpoolFull):
-                await poster.post(AgentState(seq=0, observed_at=at or now(), state="silent", why="the agent ended"))
+                recorded = at if isinstance(config.source, CaptureSource) else None
+                ended = recorded or datetime.fromtimestamp(clock(), UTC)
+                await poster.post(AgentState(seq=0, observed_at=ended, state="silent", why="the agent ended"))
             with contextlib.suppress(asyncio.CancelledError):
                 await poster.drain(drain_s)
             tally.trouble = str(poster.trouble or "")

@@ -33,10 +33,11 @@ class Seen:
 Arrival = tuple[datetime, Sequence[Seen] | DeviceState]
 
 
-async def arrivals(
-    config: HandConfig, now: Callable[[], datetime] = lambda: datetime.now(UTC)
-) -> AsyncGenerator[Arrival, None]:
-    """Reports in groups, and states of the device, with the time of arrival. Ends only where a capture does."""
+async def arrivals(config: HandConfig, clock: Callable[[], float]) -> AsyncGenerator[Arrival, None]:
+    """Reports in groups, and states of the device, with the time of arrival. Ends only where a capture does.
+
+    ``clock`` gives Unix time.
+    """
     source = config.source
     if isinstance(source, CaptureSource):
         for arrival in _capture(source):
@@ -44,7 +45,7 @@ async def arrivals(
         return
     own_clock = isinstance(source, LlrpSource) and source.reader_clock
     async for item in _link(config).listen():
-        at = now()
+        at = datetime.fromtimestamp(clock(), UTC)
         if isinstance(item, DeviceState):
             yield at, item
         else:

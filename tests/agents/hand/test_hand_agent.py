@@ -96,6 +96,22 @@ def test_a_tag_too_long_for_the_wire_does_not_stop_the_others(town, room, config
     assert "more than 64 digits" in caplog.text
 
 
+def test_a_full_spool_is_said(town, room, configure, tmp_path, capsys):
+    (tmp_path / "x.bin").write_bytes(capture(*REPORTS))
+    source = {"kind": "capture", "format": "llrp", "path": "x.bin"}
+    config = configure(source, url="http://127.0.0.1:9", spool={"path": "hand.spool", "max_items": 2})
+    assert cli.main(["agent", "hand", "--config", str(config), "--once", "--timeout", "0.1"]) == 1
+    assert "2 lost, 2 waiting in the spool" in capsys.readouterr().out
+
+
+def test_the_agent_needs_no_numeric_libraries():
+    """A sensor host with the light install has no numba and no scipy; reading tags needs no numpy either."""
+    block = "import sys; sys.modules.update(dict.fromkeys(('numpy', 'numba', 'scipy', 'fastapi')))"
+    command = f"{block}; from tms_agents.commands.agent import main; main(['hand', '--help'])"
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_file_without_frames_makes_the_agent_faulty(town, room, configure, tmp_path):
     (tmp_path / "x.bin").write_bytes(b"nothing of the kind")
     config = configure({"kind": "capture", "format": "llrp", "path": "x.bin"})

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import dataclasses
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 
@@ -26,7 +27,7 @@ class LlrpEmulator:
         host: str = "127.0.0.1",
         port: int = 0,
         period_s: float = 0.1,
-        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+        clock: Callable[[], float] = time.time,
     ) -> None:
         self.host, self.port = host, port
         #: Connection attempt status to greet with (0: welcome), ROSpec commands to fail, and "say nothing at all".
@@ -37,7 +38,7 @@ class LlrpEmulator:
         #: Names of the messages received, for tests.
         self.heard: list[str] = []
         self.acknowledged = 0
-        self._period_s, self._now = period_s, now
+        self._period_s, self._clock = period_s, clock
         self._rospec, self._running, self._immediate = 0, False, False
         self._keepalive_s = 0.0
         self._writer: asyncio.StreamWriter | None = None
@@ -61,6 +62,9 @@ class LlrpEmulator:
         if self._writer is not None:
             self._writer.transport.abort()
 
+    def _utc(self) -> datetime:
+        return datetime.fromtimestamp(self._clock(), UTC)
+
     async def __aenter__(self) -> LlrpEmulator:
         self._server = await asyncio.start_server(self._serve, self.host, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
@@ -81,7 +85,7 @@ class LlrpEmulator:
         task.add_done_callback(self._tasks.discard)
         refuse = self.refuse or (2 if self._writer is not None else 0)
         attempt = Parameter("ConnectionAttemptEvent", {"Status": refuse})
-        writer.write(encode(messages.event(self._now(), attempt)))
+        writer.write(encode(messages.event(self._utc(), attempt)))
         if refuse:
             writer.close()
             return
@@ -147,7 +151,7 @@ class LlrpEmulator:
         while True:
             await asyncio.sleep(self._period_s)
             if self._running and self.tags and not self.silent:
-                now = self._now()
+                now = self._utc()
                 reads = [dataclasses.replace(tag, first_seen=now, last_seen=now) for tag in self.tags.values()]
                 writer.write(encode(messages.report(reads)))
 
