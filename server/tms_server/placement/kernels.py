@@ -418,7 +418,8 @@ def threshold(cw: Any, budget: int) -> Any:
                 above += 1
             else:
                 rest += cw[i]
-        if above == kept or above >= budget:
+        # Equal weights at c: rounding may lift c over them again, and the count must not fall back for ever.
+        if above <= kept or above >= budget:
             return c
         kept = above
         c = rest / (budget - above)
