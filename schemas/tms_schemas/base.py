@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Annotated
 
-from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints, WithJsonSchema
 
 
 class Model(BaseModel):
@@ -34,11 +34,17 @@ LabelId = Annotated[str, StringConstraints(min_length=1, max_length=129, pattern
 Jan = Annotated[str, StringConstraints(pattern=r"^([0-9]{8}|[0-9]{12,14})$")]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=200, strip_whitespace=True, pattern=r"^[^\x00]+$")]
 
+
+def numbers(count: int, **bounds: float) -> WithJsonSchema:
+    """How a tuple of numbers is published: as an array, which every generator of clients and tests can read."""
+    return WithJsonSchema({"type": "array", "items": {"type": "number"} | bounds, "minItems": count, "maxItems": count})
+
+
 #: Metres in the room frame. The bound keeps squared distances finite.
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
-Xy = tuple[Metres, Metres]
+Xy = Annotated[tuple[Metres, Metres], numbers(2, minimum=-1e6, maximum=1e6)]
 #: (x, y, theta): metres, radians counter-clockwise.
-Pose = tuple[Metres, Metres, Annotated[float, Field(ge=-1e3, le=1e3)]]
+Pose = Annotated[tuple[Metres, Metres, Annotated[float, Field(ge=-1e3, le=1e3)]], numbers(3, minimum=-1e6, maximum=1e6)]
 Polygon = Annotated[list[Xy], Field(min_length=3, max_length=1000)]
 Grams = Annotated[float, Field(ge=0, le=1e7)]
 Probability = Annotated[float, Field(ge=0, le=1)]

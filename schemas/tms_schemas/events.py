@@ -11,12 +11,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tms_schemas.base import Grams, LabelId, Metres, Model, Probability, Tag, Xy
+from tms_schemas.base import Grams, LabelId, Metres, Model, Probability, Tag, Xy, numbers
 
 ExclusiveKind = Literal["cabinet", "floor", "robot", "table"]
 Kind = Literal["cabinet", "floor", "robot", "table", "mover"]
 #: Covariance of (x, y) as (xx, xy, yy), m^2.
-Covariance = tuple[float, float, float]
+Covariance = Annotated[tuple[float, float, float], numbers(3)]
 
 
 class Near(Model):

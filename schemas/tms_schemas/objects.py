@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tms_schemas.base import Grams, Jan, Model, Name, Polygon, Pose, RoomId, Tag, UtcTime, Xy
+from tms_schemas.base import Grams, Jan, Model, Name, Polygon, Pose, RoomId, Tag, UtcTime, Xy, numbers
 
 Length = Annotated[float, Field(gt=0, le=100)]
 
@@ -16,7 +16,7 @@ def _cube(value: Any) -> Any:
 
 
 #: Full extents (x, y, z) in metres; a single number means a cube of that edge.
-Size = Annotated[tuple[Length, Length, Length], BeforeValidator(_cube)]
+Size = Annotated[tuple[Length, Length, Length], BeforeValidator(_cube), numbers(3, exclusiveMinimum=0, maximum=100)]
 #: The tag's user memory as hex, at most 192 bytes.
 UserMemory = Annotated[str, Field(pattern=r"^([0-9A-Fa-f]{2}){0,192}$")]
 Tracking = Literal["placement", "map"]
