@@ -11,13 +11,23 @@ from typing import Any, Generic, TypeVar
 
 import httpx
 
+from tms_client.errors import TownError
 from tms_client.flows import Call, Flow, Outcome, Wait
 
 T = TypeVar("T")
 
 
 def client_options(url: str, key: str | None, timeout_s: float, verify: ssl.SSLContext | bool) -> dict[str, Any]:
-    """Arguments common to both kinds of httpx client."""
+    """Arguments common to both kinds of httpx client.
+
+    Raises:
+        TownError: ``url`` is no http or https address.
+    """
+    try:
+        if httpx.URL(url).scheme not in ("http", "https"):
+            raise httpx.InvalidURL("it must begin with http:// or https://")
+    except httpx.InvalidURL as error:
+        raise TownError(f"the address {url!r} cannot be used: {error}") from error
     headers = {"Accept": "application/json"} | ({"Authorization": f"Bearer {key}"} if key else {})
     timeout = httpx.Timeout(timeout_s, connect=min(5.0, timeout_s))
     return {"base_url": url.rstrip("/"), "headers": headers, "timeout": timeout, "verify": verify}

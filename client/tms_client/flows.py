@@ -121,7 +121,8 @@ def _error(call: Call, outcome: Outcome) -> TownError:
     if isinstance(outcome, httpx.TransportError) and not isinstance(
         outcome, httpx.UnsupportedProtocol | httpx.LocalProtocolError
     ):
-        return Unreachable(f"{call.method} {call.path}: {outcome or type(outcome).__name__}")
+        url = outcome.request.url
+        return Unreachable(f"{url.scheme}://{url.netloc.decode()} does not answer: {outcome or type(outcome).__name__}")
     return TownError(f"{call.method} {call.path}: {outcome!r}")
 
 

@@ -200,6 +200,12 @@ def test_unreachable_after_growing_pauses(slept):
     assert all(0.05 * 2**n <= pause <= 0.1 * 2**n for n, pause in enumerate(slept)) and len(slept) == 4
 
 
+@pytest.mark.parametrize("url", ["ftp://host", "localhost:8080", "http://host:port"])
+def test_an_address_that_cannot_be(url):
+    with pytest.raises(tms_client.TownError, match="cannot be used"):
+        Town(url)
+
+
 def test_both_clients_have_the_same_methods():
     for blocking, awaited in (
         (Town, AsyncTown),

@@ -145,7 +145,7 @@ class Link(Generic[T]):
                             failures = 0
                         yield item
                 why = "the connection was closed by the device"
-            except (OSError, TimeoutError, DeviceFault) as error:
+            except (OSError, ValueError, DeviceFault) as error:  # ValueError: an impossible baud rate or host name
                 why = str(error) or type(error).__name__
             for state in self._change("faulty", f"{self._name}: {why}"):
                 yield state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -9,6 +10,7 @@ from datetime import UTC, datetime
 from tms_client.cli import ArgumentParser, CommandError
 from tms_client.commands.options import add_server_options
 from tms_client.errors import TownError
+from tms_client.flows import Retry
 from tms_client.town import Town
 
 
@@ -20,7 +22,7 @@ def main(argv: Sequence[str]) -> int:
     add_server_options(parser)
     arguments = parser.parse_args(argv)
     try:
-        with Town(arguments.url, arguments.key) as town:
+        with Town(arguments.url, arguments.key, retry=Retry(attempts=3)) as town:
             answer = town.where(" ".join(arguments.name), at=arguments.at)
     except TownError as error:
         raise CommandError(str(error)) from error
@@ -29,5 +31,8 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _time(text: str) -> datetime:
-    at = datetime.fromisoformat(text)
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time like 2026-11-20T10:00:00Z") from None
     return at if at.tzinfo else at.replace(tzinfo=UTC)
