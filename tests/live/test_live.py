@@ -62,7 +62,9 @@ class Room:
         query = urlencode({"room": self.id, **wanted}, doseq=True)
         headers = {"Authorization": f"Bearer {key}"} if key else {}
         address = self.url.replace("http", "ws", 1)
-        with connect(f"{address}/v1/live?{query}", additional_headers=headers, max_size=None) as socket:
+        with connect(
+            f"{address}/v1/live?{query}", additional_headers=headers, max_size=None, close_timeout=0.2
+        ) as socket:
             yield socket
 
 
@@ -140,7 +142,7 @@ def test_a_late_arrival_shows_what_it_changed(room: Room) -> None:
 
 
 def test_events_are_lossless_under_forced_disconnects(room: Room) -> None:
-    count = 200
+    count = 400
     start = room.post("floor", 0, type="mover_entered", label=1, xy=[0, 0])
 
     def walk() -> None:
@@ -218,7 +220,7 @@ def test_who_reads_nothing_delays_nobody(room: Room) -> None:
         del deaf
         frame(socket)
         slowest = 0.0
-        for i in range(1, 40):
+        for i in range(1, 100):
             began = time.monotonic()
             head = room.post("floor", i, type="label_moved", label=1, xy=[i / 100, 1])
             until(socket, lambda one, head=head: isinstance(one, StateFrame) and one.cursor >= head)
