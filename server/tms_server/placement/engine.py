@@ -115,7 +115,7 @@ class Engine:
             steps = transfers.appeared(world, event, p_jump)
         else:
             steps = _HANDLERS[type(event)](world, event)
-        budget = None if self.budget is None else Budget(self.budget, key, self._belief)
+        budget = None if self.budget is None else Budget(self.budget, key)
         log_evidence, ceiling, contradiction = 0.0, 1.0, False
         touched: list[Array] = []
         try:

@@ -452,3 +452,32 @@ def thin(cw: Any, c: float, u: float, budget: int) -> Any:
                 keep[n] = i
                 n += 1
     return keep[:n]
+
+
+@njit(cache=True)
+def calibrate(rows: Any, w: Any, target: Any, sweeps: int) -> None:
+    """Shift the weights of a thinned set, in place, towards the marginals [K, S] that it had before thinning.
+
+    Parallel iterative scaling (Darroch and Ratcliff): all columns at once, so that no object is favoured.
+    """
+    n_h, n_k = rows.shape
+    step = min(1.0, 2.0 / n_k)
+    ratio = np.zeros(target.shape)
+    for _ in range(sweeps):
+        ratio[:] = 0.0
+        for h in range(n_h):
+            for k in range(n_k):
+                ratio[k, rows[h, k]] += w[h]
+        for k in range(n_k):
+            for s in range(target.shape[1]):
+                if ratio[k, s] > 0.0:
+                    ratio[k, s] = step * math.log(max(target[k, s], 1e-300) / ratio[k, s])
+        total = 0.0
+        for h in range(n_h):
+            x = 0.0
+            for k in range(n_k):
+                x += ratio[k, rows[h, k]]
+            w[h] *= math.exp(x)
+            total += w[h]
+        for h in range(n_h):
+            w[h] /= total

@@ -126,7 +126,7 @@ def _jumped(world: World, obj: int, slot: int) -> Children:
     at = belief.column(obj)
     room = at != slot
     if slot != OUT_SLOT and labels[slot].kind != "mover":
-        room &= ~(belief.rows == slot).any(axis=1) & ~bool((belief.pinned == slot).any())
+        room &= ~((belief.rows == slot).any(axis=1) | (belief.pinned == slot).any())
     everything = belief.everything()
     come = np.flatnonzero(room).astype(np.int32)
     target = np.full(labels.n_slots, slot, np.int32)

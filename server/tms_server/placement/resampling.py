@@ -11,7 +11,7 @@ import numpy as np
 
 from tms_server.placement import kernels
 from tms_server.placement.specs import DrawKey
-from tms_server.placement.state import Array, Children, Hypotheses
+from tms_server.placement.state import Array
 
 
 def generator(key: DrawKey) -> np.random.Generator:
@@ -24,8 +24,8 @@ def generator(key: DrawKey) -> np.random.Generator:
 class Budget:
     """Thins the children of one event to ``most``; random numbers are drawn only if that is needed."""
 
-    def __init__(self, most: int, key: DrawKey, belief: Hypotheses) -> None:
-        self._most, self._key, self._belief = most, key, belief
+    def __init__(self, most: int, key: DrawKey) -> None:
+        self._most, self._key = most, key
         self._rng: np.random.Generator | None = None
 
     @property
@@ -33,15 +33,16 @@ class Budget:
         """Whether the set had to be thinned."""
         return self._rng is not None
 
-    def __call__(self, w: Array, children: Children) -> tuple[Array, Array] | None:
+    def __call__(self, w: Array) -> tuple[Array, Array] | None:
         """Which of the normalised children to keep, and their new weights; None keeps all."""
         if w.size <= self._most:
             return None
         if self._rng is None:
             self._rng = generator(self._key)
         c = kernels.threshold(w, self._most)
-        keep = kernels.thin(w, c, self._rng.random(), self._most)
-        kept = w[keep]
+        weights = w.copy()
+        keep = kernels.thin(weights, c, self._rng.random(), self._most)
+        kept = weights[keep]
         return keep, kept / kept.sum()
 
 

@@ -11,6 +11,9 @@ from tms_server.placement import kernels
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+#: Sweeps of calibration after thinning; more change little.
+_SWEEPS = 6
+
 
 class Children(NamedTuple):
     """Hypotheses after an event as (parent row, object moved or -1, where to, mass, hash); see ``kernels``."""
@@ -65,12 +68,12 @@ class Hypotheses:
         *,
         merge: bool,
         rows: Array | None = None,
-        limit: Callable[[Array, Children], tuple[Array, Array] | None] | None = None,
+        limit: Callable[[Array], tuple[Array, Array] | None] | None = None,
     ) -> tuple[float, Array]:
         """Make the children the new set.
 
-        ``rows``: what their parents index, if not the present rows. ``limit(masses, children)`` may answer which of
-        the (normalised) children to keep, and their weights.
+        ``rows``: what their parents index, if not the present rows. ``limit(weights)`` may answer which of the
+        (normalised) children to keep, and their weights.
 
         Returns (total mass, objects that were in play or moved). A total of 0 leaves everything as it is.
         """
@@ -84,13 +87,24 @@ class Hypotheses:
         if not total > 0.0:
             return 0.0, np.empty(0, np.int32)
         w = mass / total
-        chosen = None if limit is None else limit(w, Children(parent, obj, to, mass, zob))
-        if chosen is not None:
-            keep, w = chosen
-            parent, obj, to, zob = parent[keep], obj[keep], to[keep], zob[keep]
         self.rows, self.cols, touched = kernels.build(rows, self.cols, self.col_of, self.pinned, parent, obj, to)
         self.w, self.zob = w, zob
+        chosen = None if limit is None else limit(w)
+        if chosen is not None:
+            self._thin(*chosen)
         return total, touched
+
+    def _thin(self, keep: Array, w: Array) -> None:
+        """Keep some rows with new weights, calibrated to the marginals of all rows."""
+        target = kernels.marginals(self.rows, self.w, int(self.rows.max(initial=0)) + 1)
+        rows = self.rows[keep]
+        if rows.shape[1]:
+            kernels.calibrate(rows, w, target, _SWEEPS)
+        still = np.full(keep.size, -1, np.int32)
+        self.w, self.zob = w, self.zob[keep]
+        self.rows, self.cols, _ = kernels.build(
+            rows, self.cols, self.col_of, self.pinned, np.arange(keep.size, dtype=np.int32), still, still
+        )
 
     def unpin(self, objects: Array) -> None:
         """Give certain objects a column, although they do not vary yet."""

@@ -7,17 +7,17 @@ import math
 from collections import defaultdict
 
 EMPTY = None
-DEFAULTS = dict(
-    sigma_m=0.5, gate_m=None, mover_choice="all",
-    alpha={"cabinet": 0.98, "robot": 0.99, "table": 0.99, "floor": 0.9, "mover": 0.95, "handover": 0.99},
-    p_read=0.95, use_null_reads=True,
-    p_phantom={}, p_jump=0.0, p_occlude={},
-    sigma_ghost_m=0.15, ghost_weight=1.0,
-    use_weight=True, weight_sd_g=5.0, weight_range_g=3000.0,
-    use_size=True, size_sd_m=0.02, size_range_m=0.5,
-    p_return=0.0, use_handover=True, p_handover=0.1, use_swap=True,
-    prune_eps=0.0, p_correction=0.999,
-)  # fmt: skip
+DEFAULTS = {
+    "sigma_m": 0.5, "gate_m": None, "mover_choice": "all",
+    "alpha": {"cabinet": 0.98, "robot": 0.99, "table": 0.99, "floor": 0.9, "mover": 0.95, "handover": 0.99},
+    "p_read": 0.95, "use_null_reads": True,
+    "p_phantom": {}, "p_jump": 0.0, "p_occlude": {},
+    "sigma_ghost_m": 0.15, "ghost_weight": 1.0,
+    "use_weight": True, "weight_sd_g": 5.0, "weight_range_g": 3000.0,
+    "use_size": True, "size_sd_m": 0.02, "size_range_m": 0.5,
+    "p_return": 0.0, "use_handover": True, "p_handover": 0.1, "use_swap": True,
+    "prune_eps": 0.0, "p_correction": 0.999,
+}  # fmt: skip
 
 
 def gauss(x, mean, var):
@@ -119,7 +119,7 @@ class Oracle:
         return gauss(s, self.objects[c]["size_m"], self.p["size_sd_m"] ** 2)
 
     def log_k(self, mover, xy):
-        return -math.dist(self.xy[mover], xy) ** 2 / (2 * self.p["sigma_m"] ** 2)
+        return -(math.dist(self.xy[mover], xy) ** 2) / (2 * self.p["sigma_m"] ** 2)
 
     def gated(self, movers, xy):
         """The movers that count: those inside the gate, or all if nobody is."""
@@ -201,9 +201,7 @@ class Oracle:
             if p["mover_choice"] == "holding":
                 can_move = [m for m in movers if self.held(x, m)]
                 can_ghost = {g: v for g, v in ghost_logs.items() if self.held(x, g)}
-            chance = self.normalised_logs(
-                {m: self.log_k(m, xy) for m in self.gated(can_move, xy)} | can_ghost
-            )
+            chance = self.normalised_logs({m: self.log_k(m, xy) for m in self.gated(can_move, xy)} | can_ghost)
             if not chance:
                 out[x] += w * u * factor(EMPTY)
             for m, pm in chance.items():

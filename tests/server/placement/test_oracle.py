@@ -53,5 +53,3 @@ def test_random_scenarios_equal_the_oracle(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(40))
 def test_long_scenarios_equal_the_oracle(seed: int) -> None:
     compare(WorldMaker(Random(f"long {seed}"), events=20).scenario)
-
-

@@ -74,10 +74,10 @@ class WorldMaker:
             "sigma_m": [0.2, 1.0],
             "use_null_reads": [False],
             "p_read": [0.7, 1.0],
-            "alpha": [{"cabinet": 1.0}, {"floor": 0.5, "mover": 0.8}, {k: 1.0 for k in (*KINDS, "mover", "handover")}],
+            "alpha": [{"cabinet": 1.0}, {"floor": 0.5}, dict.fromkeys((*KINDS, "mover", "handover"), 1.0)],
             "p_phantom": [{"floor": 0.1}, {"floor": 0.2, "cabinet": 0.05, "robot": 0.1, "table": 0.3}],
             "p_jump": [0.1, 0.3],
-            "p_occlude": [{"floor": 0.3}, {"floor": 1.0}, {k: 0.4 for k in KINDS}],
+            "p_occlude": [{"floor": 0.3}, {"floor": 1.0}, dict.fromkeys(KINDS, 0.4)],
             "sigma_ghost_m": [0.5],
             "ghost_weight": [0.3, 3.0, 0.0],
             "use_weight": [False],
@@ -190,10 +190,7 @@ class WorldMaker:
             source = r.choice(list(self.kind))
             if self.kind[source] == "mover":
                 others = [m for m in movers if m != source]
-                if not others or self.chance(0.5):
-                    to = self.name("mover")
-                else:
-                    to = r.choice(others)
+                to = self.name("mover") if not others or self.chance(0.5) else r.choice(others)
             elif self.chance(0.2):
                 to = r.choice(movers)
             else:
