@@ -1,7 +1,7 @@
 """Crowded rooms for the belief engine: many objects, several people who stand close, few identities.
 
-People take things from cabinets and the floor, and put them on the floor (no identity) or into cabinets (tags are often missed, weights
-are coarse). With 30 objects, 4 people and 60 object events the exact posterior has tens of thousands of hypotheses.
+People take things from cabinets and the floor, and put them on the floor (no identity) or into cabinets (tags are
+sometimes missed, weights are coarse). With 30 objects, 4 people and 60 object events the exact posterior has tens of thousands of hypotheses.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class DenseWorld:
     def _take(self, who: str, what: str) -> int:
         label = self._at[what]
         self._walk(who, self._xy[label])
-        event = {"type": "label_vanished", "label": label}
+        event: dict[str, Any] = {"type": "label_vanished", "label": label}
         if label.startswith("cabinet"):
             event["weight_g"] = self._measured(what)
         self._events.append(event)
@@ -107,7 +107,7 @@ class DenseWorld:
         return 1
 
     def _measured(self, what: str) -> float:
-        weight = next(o["weight_g"] for o in self._objects if o["id"] == what)
+        weight: float = next(o["weight_g"] for o in self._objects if o["id"] == what)
         return round(max(weight + self._rnd.gauss(0, 18), 1.0), 1)
 
     def _walk(self, who: str, to: tuple[float, float]) -> None:

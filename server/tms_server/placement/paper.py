@@ -73,7 +73,7 @@ class PaperFilter:
         self._parameters = parameters
         self._objects = ObjectTable(objects, parameters)
         self._labels = starting_labels(tuple(labels))
-        self._share, self._cycles = share, cycles
+        self._share, self.cycles = share, cycles
         rng = generator(DrawKey(seed, "first individuals", 0))
         start, _ = starting_hypotheses(initial, self._objects, self._labels, individuals)
         chosen = rng.choice(len(start), individuals, p=start.w)
@@ -224,8 +224,8 @@ class PaperFilter:
     # -- steps 3 and 4: fitness and resampling
 
     def _cycles_after(self, news: bool) -> int:
-        if self._cycles is not None:
-            return self._cycles
+        if self.cycles is not None:
+            return self.cycles
         if not news:
             return 1
         wanted = math.ceil(max(len(self._reports), 1) * math.log(1.0 / _SETTLED))
@@ -291,7 +291,7 @@ class PaperFilter:
             "labels": self._labels.to_json(),
             "reports": list(self._reports.items()),
             "share": self._share,
-            "cycles": self._cycles,
+            "cycles": self.cycles,
         }
         return pack("paper", header, {"x": self._x})
 
@@ -304,6 +304,6 @@ class PaperFilter:
         self._objects = ObjectTable([ObjectSpec(**o) for o in header["objects"]], self._parameters)
         self._labels = Labels.from_json(header["labels"])
         self._reports = dict(header["reports"])
-        self._share, self._cycles = header["share"], header["cycles"]
+        self._share, self.cycles = header["share"], header["cycles"]
         self._x, self._p = arrays["x"], None
         return self
