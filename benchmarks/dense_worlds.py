@@ -1,7 +1,8 @@
 """Crowded rooms for the belief engine: many objects, several people who stand close, few identities.
 
 People take things from cabinets and the floor, and put them on the floor (no identity) or into cabinets (tags are
-sometimes missed, weights are coarse). With 30 objects, 4 people and 60 object events the exact posterior has tens of thousands of hypotheses.
+sometimes missed, weights are coarse). With 30 objects, 4 people and 60 object events the exact posterior has up to
+millions of hypotheses; the benchmark keeps the worlds with tens of thousands.
 """
 
 from __future__ import annotations
