@@ -15,9 +15,9 @@ from tms_server.live.version import Encoder, Version
 from tms_server.town import Town
 
 _log = logging.getLogger(__name__)
-#: Seconds between two versions at least; and after which the room is looked at again without news: silence shows.
-MIN_INTERVAL_S, REFRESH_S = 0.05, 5.0
-#: At most this share of the time goes into making versions of one room.
+#: Seconds between two versions: the longer they take to make, the fewer, so that at most ``_SHARE`` of the time goes
+#: into them. After ``REFRESH_S`` the room is looked at again without news: silence shows.
+MIN_INTERVAL_S, MAX_INTERVAL_S, REFRESH_S = 0.05, 1.0, 5.0
 _SHARE = 0.2
 #: Log records kept as frames, and read at once.
 _KEPT, _PAGE = 4096, 500
@@ -90,14 +90,14 @@ class Feed:
                 if done:
                     change.result()
                     change = asyncio.ensure_future(anext(changes))
-                began = loop.time()
                 view = await self._town.belief(self.room)
+                began = loop.time()  # waiting for the belief costs nothing, making the version does
                 version = Version.of(view, self._version)
+                spent = loop.time() - began
                 if version is not self._version:
                     self._version = version
                     self._tell()
-                spent = loop.time() - began
-                await asyncio.sleep(max(MIN_INTERVAL_S, spent / _SHARE))
+                await asyncio.sleep(min(MAX_INTERVAL_S, max(MIN_INTERVAL_S, spent / _SHARE)))
         finally:
             change.cancel()
 
