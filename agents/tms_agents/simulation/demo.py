@@ -83,9 +83,12 @@ def _story(town: Town, player: Player, posters: list[Poster], plan: Plan, termin
         off = pies.differences(step.expected(plan.weights), found)
         terminal.pies(found, off)
         wrong += len(off)
-    terminal.verdict(wrong)
+    terminal.verdict(wrong, weighed=plan.weights)
     if plan.weights:
-        terminal.say(f"Weight knew objects 3 and 4 apart {READ_S:.1f} s before the tag was read (step 5).")
+        terminal.say(
+            f"Weight told objects 3 and 4 apart in step (5), {READ_S:.1f} s before the tag was read; "
+            "without it both are 1/2 - 1/2 until then."
+        )
     return wrong == 0
 
 

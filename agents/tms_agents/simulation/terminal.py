@@ -30,12 +30,9 @@ class Terminal:
             self.say(f"    NOT AS EXPECTED: {line}")
         self._out.flush()
 
-    def verdict(self, wrong: int) -> None:
-        self.say(
-            "\nEvery pie is as in the paper, within 0.02."
-            if wrong == 0
-            else f"\n{wrong} slices are not as in the paper."
-        )
+    def verdict(self, wrong: int, *, weighed: bool) -> None:
+        source = "as weighing tells" if weighed else "as in the paper"
+        self.say(f"\nEvery pie is {source}, within 0.02." if wrong == 0 else f"\n{wrong} slices are not {source}.")
 
     def _bold(self, text: str) -> str:
         return f"\x1b[1m{text}\x1b[0m" if self._colour else text
