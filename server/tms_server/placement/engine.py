@@ -48,7 +48,6 @@ NEGLIGIBLE = 1e-15
 
 _HANDLERS: Mapping[type, Callable[[World, Any], Steps]] = {
     LabelVanished: transfers.vanished,
-    LabelMoved: moves.moved,
     MoverEntered: moves.entered,
     MoverLeft: moves.left,
     TagObserved: readings.tag_observed,
@@ -106,10 +105,12 @@ class Engine:
         Raises:
             InvalidEvent: the event does not fit the labels; the state is unchanged.
         """
+        if isinstance(event, LabelMoved):
+            self._labels.move(self._labels.active(event.label), event.xy)
+            return self._info(0.0, False, frozenset(), 0.0, False)
         if isinstance(event, Tick):
             return self._info(0.0, False, frozenset(), 0.0, False)
-        if not isinstance(event, LabelMoved):
-            self._pies = None
+        self._pies = None
         world = World(self._parameters, self._objects, self._labels, self._belief)
         if isinstance(event, LabelAppeared):
             steps = transfers.appeared(world, event, p_jump)

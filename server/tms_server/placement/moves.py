@@ -1,23 +1,16 @@
-"""Movers and whole contents: enter, leave, swapped tracks, relabelled contents, moved labels."""
+"""Movers and whole contents: enter, leave, swapped tracks, relabelled contents."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tms_schemas.events import LabelMoved, MoverEntered, MoverLeft, MoverSwap, Transfer
+from tms_schemas.events import MoverEntered, MoverLeft, MoverSwap, Transfer
 from tms_server.placement import kernels
 from tms_server.placement.labels import OUT_SLOT
 from tms_server.placement.specs import InvalidEvent
 from tms_server.placement.state import Array, Children
 from tms_server.placement.steps import Step, Steps, World
 from tms_server.placement.transfers import entered_with
-
-
-def moved(world: World, event: LabelMoved) -> Steps:
-    """A label is elsewhere; the belief is as it was."""
-    world.labels.move(world.labels.active(event.label), event.xy)
-    return
-    yield
 
 
 def entered(world: World, event: MoverEntered) -> Steps:
