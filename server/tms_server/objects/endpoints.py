@@ -13,9 +13,7 @@ from tms_server.db.paging import Cursor, Limit
 from tms_server.db.session import ReadSession, Session
 from tms_server.objects import finding, intake_endpoints, product_endpoints, service
 
-router = APIRouter(tags=["objects"])
-router.include_router(product_endpoints.router)
-router.include_router(intake_endpoints.router)
+objects = APIRouter(tags=["objects"])
 
 Text = Annotated[
     str | None,
@@ -29,7 +27,7 @@ AreaText = Annotated[
 AtLeast = Annotated[Probability, Query(description="with area: least probability of being inside")]
 
 
-@router.get("/objects")
+@objects.get("/objects")
 async def list_objects(
     caller: Caller,
     session: ReadSession,
@@ -54,7 +52,7 @@ async def list_objects(
     return await finding.find_objects(session, request.state.town, caller, search, cursor=cursor, limit=limit)
 
 
-@router.get("/objects/{tag}")
+@objects.get("/objects/{tag}")
 async def get_object(tag: Tag, caller: Caller, session: ReadSession) -> TownObject:
     """What is known of the object; size, weight and category are its product's where it has none of its own."""
     found = await service.get_object(session, tag)
@@ -62,7 +60,7 @@ async def get_object(tag: Tag, caller: Caller, session: ReadSession) -> TownObje
     return found
 
 
-@router.put("/objects/{tag}", responses={201: {"model": TownObject, "description": "the object is new"}})
+@objects.put("/objects/{tag}", responses={201: {"model": TownObject, "description": "the object is new"}})
 async def put_object(
     tag: Tag, body: ObjectFields, _: Admin, session: Session, request: Request, response: Response
 ) -> TownObject:
@@ -72,20 +70,26 @@ async def put_object(
     return put.object
 
 
-@router.patch("/objects/{tag}")
+@objects.patch("/objects/{tag}")
 async def patch_object(tag: Tag, body: ObjectPatch, _: Admin, session: Session, request: Request) -> TownObject:
     """Change the fields given; null clears one, an absent one stays."""
     return await service.patch_object(session, request.state.clock, tag, body)
 
 
-@router.delete("/objects/{tag}", status_code=204)
+@objects.delete("/objects/{tag}", status_code=204)
 async def delete_object(tag: Tag, _: Admin, session: Session, request: Request) -> None:
     """Forget the object; its room tracks it no more."""
     await service.delete_object(session, request.state.clock, tag)
 
 
-@router.get("/objects/{tag}/model")
+@objects.get("/objects/{tag}/model")
 async def get_model(tag: Tag, caller: Caller, session: ReadSession) -> ObjectModel:
     """Geometry for mapping: class, polygon and parts from the product, the tag's pose the object's own."""
     require_see(caller, (await service.get_object(session, tag)).room)
     return await service.get_model(session, tag)
+
+
+# After the routes: a router takes over those that exist when it includes another.
+router = APIRouter()
+for part in (objects, product_endpoints.router, intake_endpoints.router):
+    router.include_router(part)

@@ -310,3 +310,20 @@ async def test_keys_see_the_objects_of_their_rooms(
     assert (await town.patch("/v1/objects/E1", json={"name": "x"}, headers=mine)).status_code == 403
     assert (await town.delete("/v1/objects/E1", headers=mine)).status_code == 403
     assert (await town.get("/v1/objects/E1")).status_code == 401
+
+
+async def test_registering_and_observing_at_once_never_collide(town: httpx.AsyncClient) -> None:
+    """Writers of the registry and of the log lock the same rooms; none may fail or wait for ever."""
+
+    def observed(room: str, agent: str, seq: int) -> dict[str, Any]:
+        read = {"seq": seq, "observed_at": "2026-11-01T00:00:00Z", "type": "raw_read", "zone": "z", "tag": f"E{seq}"}
+        return {"agent": agent, "room": room, "observations": [read]}
+
+    rooms = ("lab", "kitchen")
+    answers = await asyncio.gather(
+        *(town.put(f"/v1/objects/E{n}", json={"name": "x", "jan": TEA, "room": rooms[n % 2]}) for n in range(10)),
+        *(town.put(f"/v1/objects/E{n}", json={"name": "x", "jan": TEA, "room": rooms[n % 2 - 1]}) for n in range(10)),
+        *(town.post("/v1/observations", json=observed(room, room, n)) for n in range(10) for room in rooms),
+        *(town.put(f"/v1/products/{TEA}", json={"name": "tea", "weight_g": n}) for n in range(5)),
+    )
+    assert {answer.status_code for answer in answers} <= {200, 201}, [a.text for a in answers if not a.is_success]
