@@ -68,11 +68,12 @@ class VisitSection(Section):
 
     ``count = "visits"`` posts each visit once, when it begins: the count in the unknown-tag list is how often the
     tag came. ``count = "reports"`` posts every report of the reader: the count is how often the reader reported it,
-    whatever number of single reads a report sums up.
+    whatever number of single reads a report sums up. The default is visits for a reader, which would otherwise flood
+    the log, and reports for a capture, whose counts one wants to check against its bytes.
     """
 
     gap_s: Seconds = 2.0
-    count: Literal["visits", "reports"] = "visits"
+    count: Literal["visits", "reports"] | None = None
 
 
 class HandConfig(AgentConfig):
@@ -83,6 +84,12 @@ class HandConfig(AgentConfig):
     visits: VisitSection = VisitSection()
     #: The device is called silent when nothing valid came for this long.
     silent_after_s: Seconds = 10.0
+
+    @property
+    def counts_visits(self) -> bool:
+        """Post a tag once per visit; otherwise at every report."""
+        default = "reports" if self.source.kind == "capture" else "visits"
+        return (self.visits.count or default) == "visits"
 
     def zone_of(self, antenna: int) -> str:
         return self.zones.get(str(antenna), self.zone)

@@ -106,7 +106,7 @@ def _observations(
         tag, zone = seen.read.tag, config.zone_of(seen.read.antenna)
         tally.reports += 1
         begins = visits.see(zone, tag, seen.first, seen.last)
-        if config.visits.count == "visits" and not begins:
+        if config.counts_visits and not begins:
             continue
         try:
             observations.append(RawRead(seq=0, observed_at=seen.first, zone=zone, tag=tag))
