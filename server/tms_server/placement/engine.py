@@ -25,7 +25,7 @@ from tms_schemas.events import (
     Tick,
     Transfer,
 )
-from tms_server.placement import kernels, moves, readings, transfers
+from tms_server.placement import moves, readings, thinning, transfers
 from tms_server.placement.initial import starting_hypotheses
 from tms_server.placement.labels import OUT_SLOT, Labels, starting_labels
 from tms_server.placement.objects import ObjectTable
@@ -191,7 +191,7 @@ class Engine:
 
     def _count_pies(self) -> list[dict[str, float]]:
         """The marginals of every object in play, in the order of its column."""
-        p = kernels.marginals(self._belief.rows, self._belief.w, self._labels.n_slots)
+        p = thinning.marginals(self._belief.rows, self._belief.w, self._labels.n_slots)
         pies: list[dict[str, float]] = [{} for _ in range(p.shape[0])]
         columns, slots = np.nonzero(p >= NEGLIGIBLE)
         name = self._labels.name

@@ -9,7 +9,7 @@ import hashlib
 
 import numpy as np
 
-from tms_server.placement import kernels
+from tms_server.placement import thinning
 from tms_server.placement.specs import DrawKey
 from tms_server.placement.state import Array
 
@@ -39,9 +39,9 @@ class Budget:
             return None
         if self._rng is None:
             self._rng = generator(self._key)
-        c = kernels.threshold(w, self._most)
+        c = thinning.threshold(w, self._most)
         weights = w.copy()
-        keep = kernels.thin(weights, c, self._rng.random(), self._most)
+        keep = thinning.thin(weights, c, self._rng.random(), self._most)
         kept = weights[keep]
         return keep, kept / kept.sum()
 

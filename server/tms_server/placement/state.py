@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tms_server.placement import kernels
+from tms_server.placement import kernels, thinning
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -96,10 +96,10 @@ class Hypotheses:
 
     def _thin(self, keep: Array, w: Array) -> None:
         """Keep some rows with new weights, calibrated to the marginals of all rows."""
-        target = kernels.marginals(self.rows, self.w, int(self.rows.max(initial=0)) + 1)
+        target = thinning.marginals(self.rows, self.w, int(self.rows.max(initial=0)) + 1)
         rows = self.rows[keep]
         if rows.shape[1]:
-            kernels.calibrate(rows, w, target, _SWEEPS)
+            thinning.calibrate(rows, w, target, _SWEEPS)
         still = np.full(keep.size, -1, np.int32)
         self.w, self.zob = w, self.zob[keep]
         self.rows, self.cols, _ = kernels.build(
