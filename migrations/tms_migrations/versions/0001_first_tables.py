@@ -48,6 +48,7 @@ def upgrade() -> None:
         sa.Column("late", sa.Boolean(), nullable=False),
         sa.PrimaryKeyConstraint("room", "offset", name=op.f("pk_log")),
         sa.UniqueConstraint("agent", "seq", name="uq_log_agent"),
+        sqlite_with_rowid=False,
     )
     with op.batch_alter_table("log", schema=None) as batch_op:
         batch_op.create_index("ix_log_position", ["room", "observed_at", "agent", "seq"], unique=False)

@@ -90,6 +90,7 @@ class LogRow(Base):
     __table_args__ = (
         Index("ix_log_position", "room", "observed_at", "agent", "seq"),
         UniqueConstraint("agent", "seq", name="uq_log_agent"),
+        {"sqlite_with_rowid": False},  # one tree less to write per record
     )
 
     room: Mapped[str] = mapped_column(primary_key=True)

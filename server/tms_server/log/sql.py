@@ -23,6 +23,7 @@ from tms_server.log.record import Batch, Position, Record, Verdict
 from tms_server.log.snapshots import sql_position
 from tms_server.log.sqlite import SqliteStore
 from tms_server.log.store import Store
+from tms_server.log.tail import Tail
 
 #: Records read at a time.
 PAGE = 1000
@@ -51,6 +52,7 @@ class SqlRoomLog:
         self._store: Store = (
             SqliteStore(str(make_url(engine.url).database)) if is_sqlite(engine) else PostgresStore(engine)
         )
+        self._tail = Tail()
         self._committed: dict[str, int] = {}
         self._news: defaultdict[str, asyncio.Event] = defaultdict(asyncio.Event)
 
@@ -61,6 +63,7 @@ class SqlRoomLog:
         except Exception as error:
             raise Unavailable(f"the log cannot be written: {type(error).__name__}", retry_after_s=2) from error
         self._committed.update(plan.heads)
+        self._tail.add(plan.records)
         for room in plan.heads:
             self.poke(room)
         return plan.verdicts
@@ -68,7 +71,7 @@ class SqlRoomLog:
     async def follow(self, room: str, after: int) -> AsyncIterator[list[Record]]:
         while True:
             news = self._news[room]
-            page = await self.read(room, after, PAGE)
+            page = self._tail.after(room, after, PAGE) or await self.read(room, after, PAGE)
             if page:
                 after = page[-1].offset
                 yield page

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from bisect import bisect_right, insort
 from collections.abc import AsyncIterator
 from datetime import datetime, timedelta
+from operator import attrgetter
 from typing import NamedTuple
 
 from tms_server.clock import Clock
@@ -25,6 +27,8 @@ _log = logging.getLogger(__name__)
 #: Seconds that a query waits for the fold to catch up before it is told to come back.
 _PATIENCE_S = 30.0
 _LAST_SEQ = 2**63 - 1
+_position = attrgetter("position")
+_observed_at = attrgetter("observed_at")
 
 
 class Frozen(NamedTuple):
@@ -46,6 +50,7 @@ class RoomActor:
         self._budget = None if settings.filter == "exact" else settings.budget
         self._fold = RoomFold(self._budget)
         self._past = Checkpoints(self._fold)
+        #: Taken in but not folded, in fold order.
         self._held: list[Record] = []
         self._folding = asyncio.Lock()
         self._news = asyncio.Event()
@@ -141,14 +146,16 @@ class RoomActor:
             following.cancel()
 
     async def _take(self, page: list[Record]) -> None:
-        horizon = self._horizon()
-        waiting = sorted([*self._held, *(r for r in page if not r.late)], key=lambda record: record.position)
-        due = [record for record in waiting if record.observed_at <= horizon]
+        for record in page:
+            if not record.late:
+                insort(self._held, record, key=_position)
+        ready = bisect_right(self._held, self._horizon(), key=_observed_at)
+        due = self._held[:ready]
         head = page[-1].offset if page else self.head
         if not due and head == self.head:
             return
         async with self._folding:
-            self._held = waiting[len(due) :]
+            del self._held[:ready]
             if due:
                 await self._fold_in(due, head)
             self.head = head
@@ -166,7 +173,7 @@ class RoomActor:
         rewound = self._past.rewind(first)
         if rewound is not None:
             self._fold, again = rewound
-            merged = sorted([*again, *due], key=lambda record: record.position)
+            merged = sorted([*again, *due], key=_position)
             await asyncio.to_thread(_fold_all, self._fold, self._past, merged)
             return
         # Before everything in memory: from a stored state, or from the beginning. The log holds the new records too.

@@ -68,7 +68,7 @@ class RoomFold:
             return
         try:
             event = resolved(event, self.state.labels)
-            self._give(event, p_jump)
+            self._give(event, self._unseen(event) if p_jump is None else p_jump)
         except UnknownMover as error:
             self.note("unknown_mover", f"{event.type}: {error}")
         except InvalidEvent as error:
@@ -111,6 +111,16 @@ class RoomFold:
         twin.engine = Engine.from_bytes(engine)
         twin._record, twin._parts = None, 0
         return twin
+
+    def _unseen(self, event: events.Event) -> float | None:
+        """Nobody is known to be in the room, yet a reader named a thing: somebody unseen put it there.
+
+        Rooms with cabinets and no floor sensor live by this. Where nothing was read, it would only spread doubt.
+        """
+        if not isinstance(event, events.LabelAppeared) or event.tag is None:
+            return None
+        watched = any(info.kind == "mover" for info in self.state.labels.values())
+        return None if watched else inventory.P_JUMP
 
     def _give(self, event: events.Event, p_jump: float | None) -> None:
         record, seed = self.record, self.state.room.seed if self.state.room else 0
