@@ -75,7 +75,8 @@ def test_weight_knows_before_the_tag_is_read(tmp_path: Path) -> None:
 def test_once_leaves_after_the_story_and_writes_plain_text(tmp_path: Path, more: list[str]) -> None:
     done = tms_demo("--once", "--speed", "20", "--data-dir", str(tmp_path), *more)
     out, err = done.communicate(timeout=120)
-    assert (done.returncode, err) == (0, "")
+    assert done.returncode == 0, err
+    assert "Traceback" not in err
     assert out.startswith("The page: http://127.0.0.1:")
     assert "\x1b" not in out
     assert out.count("Tea bottle") == 7

@@ -63,7 +63,7 @@ def observed(seed: int, actions: list[tuple[object, ...]]) -> tuple[World, dict[
         world,
         [Watched(agent, said[agent.agent].extend) for agent in watching],
         speed=1.0,
-        start=START,
+        clock=lambda: START,
         sleep=lambda _: None,
     )
     player.switch_on()
@@ -140,7 +140,7 @@ def test_the_floor_sensor_tells_no_tag_and_without_scales_no_weight() -> None:
         world,
         [Watched(agent, said.extend) for agent in agents(1, weigh=False)],
         speed=1.0,
-        start=START,
+        clock=lambda: START,
         sleep=lambda _: None,
     )
     player.switch_on()

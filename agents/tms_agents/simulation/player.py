@@ -37,28 +37,31 @@ class Player:
         watched: list[Watched],
         *,
         speed: float,
-        start: datetime | None = None,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
         sleep: Callable[[float], object] = time.sleep,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.world = world
         self._watched = watched
         self._speed = speed
-        self._start = start or datetime.now(UTC)
-        self._sleep, self._monotonic = sleep, monotonic
+        self._clock, self._sleep, self._monotonic = clock, sleep, monotonic
+        self._anchor = (clock(), world.time_s)
 
     @property
     def now(self) -> datetime:
         """The time of the sensors' clocks."""
-        return self._start + timedelta(seconds=self.world.time_s / self._speed)
+        since, at_s = self._anchor
+        return since + timedelta(seconds=(self.world.time_s - at_s) / self._speed)
 
     def switch_on(self) -> None:
         """Every agent sends its inventory."""
+        self._set_clocks()
         for agent, sink in self._watched:
             sink(agent.start(self.world, self.now))
 
     def play(self, script: Script) -> None:
         """Run a script to its end; the agents look after every step of time."""
+        self._set_clocks()
         due = self._monotonic()
         for _ in script:
             self.world.step(STEP_S)
@@ -67,6 +70,10 @@ class Player:
                     sink(observations)
             due += STEP_S / self._speed
             self._sleep(max(0.0, due - self._monotonic()))
+
+    def _set_clocks(self) -> None:
+        """The room stands still between two scripts, clocks do not; they never go back."""
+        self._anchor = (max(self.now, self._clock()), self.world.time_s)
 
 
 def agents(

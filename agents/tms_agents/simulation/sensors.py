@@ -36,8 +36,8 @@ Seen = TypeVar("Seen", LabelAppeared, LabelVanished)
 SIGN_OF_LIFE = timedelta(seconds=10)
 #: A reader's round over its antennas: how long after the load cells it knows a tag.
 READ_S = 2.0
-#: A mover's position is reported after this way, and where it came to rest.
-REPORT_M = 0.25
+#: A mover's position is reported after this way, and where it came to rest; a turn on the spot from this angle on.
+REPORT_M, TURN_RAD = 0.25, 0.1
 
 
 class SensorAgent(ABC):
@@ -248,11 +248,13 @@ class RobotAgent(SensorAgent):
         self._robot = robot
         self._body = ""
         self._told: Xy = (0.0, 0.0)
+        self._told_theta = 0.0
         self._gripped: tuple[str, str] | None = None  # (label, tag)
         self._put: dict[str, str] = {}  # tag -> label of what it has put on furniture
 
     def _inventory(self, world: World) -> list[InventoryLabel]:
-        self._body, self._told = self._new_label(), world.movers[self._robot].xy
+        self._body = self._new_label()
+        self._told, self._told_theta = world.movers[self._robot].xy, world.movers[self._robot].theta
         labels = [InventoryLabel(label=self._body, kind="mover", xy=self._told)]
         tag = world.gripped_by(self._robot)
         if tag is not None:
@@ -290,9 +292,10 @@ class RobotAgent(SensorAgent):
 
     def _moved(self, world: World, now: datetime) -> list[Observation]:
         body = world.movers[self._robot]
-        if not _worth_telling(self._told, body.xy, at_rest=not body.path):
+        turned = not body.path and abs(body.theta - self._told_theta) > TURN_RAD
+        if not turned and not _worth_telling(self._told, body.xy, at_rest=not body.path):
             return []
-        self._told = body.xy
+        self._told, self._told_theta = body.xy, body.theta
         x, y = self._measured(body.xy, 0.01)
         found: list[Observation] = [
             PoseReport(seq=self._next_seq(), observed_at=now, label=self._body, pose=(x, y, round(body.theta, 4)))

@@ -23,6 +23,6 @@ function paragraph(location, model) {
   const list = likely.map(({ words, p }, i) => `${i === 0 && p < 0.95 ? "probably " : ""}${words} (${percent(p)})`);
   let text = list.length === 0 ? " is in no room that is watched." : ` is ${list.join(", or ")}.`;
   if (elsewhere) text = `${text.slice(0, -1)}, in room ${location.room}.`;
-  if (location.staleness_s !== null) text += ` Its tag was last read ${duration(location.staleness_s)} before.`;
+  if (location.staleness_s !== null) text += ` Its tag was last read ${duration(location.staleness_s)} ago.`;
   return html("p", {}, html("strong", {}, location.name), text);
 }
