@@ -27,7 +27,7 @@ from tms_schemas.events import (
 )
 from tms_server.placement import moves, readings, thinning, transfers
 from tms_server.placement.initial import starting_hypotheses
-from tms_server.placement.labels import OUT_SLOT, Labels, starting_labels
+from tms_server.placement.labels import Labels, starting_labels
 from tms_server.placement.objects import ObjectTable
 from tms_server.placement.parameters import Parameters
 from tms_server.placement.resampling import Budget, light
@@ -100,7 +100,10 @@ class Engine:
     # -- events
 
     def apply(self, event: Event, key: DrawKey, *, p_jump: float | None = None) -> Info:
-        """Fold one event; ``p_jump`` overrides the parameter for this ``label_appeared``.
+        """Fold one event.
+
+        ``p_jump`` is for a ``label_appeared`` that nobody was there to cause, or to see: with this probability, in
+        place of the parameter's, something came from OUT (and only from there).
 
         Raises:
             InvalidEvent: the event does not fit the labels; the state is unchanged.
@@ -241,11 +244,22 @@ class Engine:
 
     # -- the registry
 
-    def add_object(self, spec: ObjectSpec) -> None:
-        """Track one more object; it starts at OUT. ValueError if its id or tag is taken."""
-        self._objects = ObjectTable((*self._objects.specs, spec), self._parameters)
-        b, self._pies = self._belief, None
-        self._belief = Hypotheses(b.rows, b.w, b.cols, np.append(b.pinned, np.int32(OUT_SLOT)))
+    def add_object(self, spec: ObjectSpec, places: Mapping[str, float] | None = None) -> None:
+        """Track one more object: at OUT, or at active labels with the given prior probabilities and at OUT otherwise.
+
+        Under hypotheses in which an exclusive label is occupied, its share stays at OUT.
+
+        Raises:
+            ValueError: the id or tag is taken, or the probabilities sum to more than 1.
+            InvalidEvent: a label is not active.
+        """
+        slots = {self._labels.active(name): p for name, p in (places or {}).items()}
+        if sum(slots.values()) > 1.0 + 1e-12:
+            raise ValueError("the probabilities of the places sum to more than 1")
+        objects = ObjectTable((*self._objects.specs, spec), self._parameters)
+        exclusive = [slot for slot in slots if self._labels[slot].kind != "mover"]
+        self._belief = self._belief.joined(slots, exclusive)
+        self._objects, self._pies = objects, None
 
     def remove_object(self, object_id: str) -> None:
         """Forget an object: the belief is marginalised over it. KeyError if it is unknown."""

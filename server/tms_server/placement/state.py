@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,6 +116,32 @@ class Hypotheses:
         self.cols, self.rows = order[by_object], np.ascontiguousarray(rows[:, by_object])
         self.pinned[objects] = -1
         self.col_of[self.cols] = np.arange(self.cols.size, dtype=np.int32)
+
+    def joined(self, places: Mapping[int, float], exclusive: Sequence[int]) -> Hypotheses:
+        """This belief with one more object, the last: independently at each slot of ``places`` with its probability.
+
+        The rest of the probability is OUT (slot 0), and so is the share of an ``exclusive`` slot that is occupied.
+        """
+        obj, still = self.pinned.size, np.arange(self.w.size)
+        parents, to, masses, outside = [], [], [], np.ones(self.w.size)
+        for slot, p in places.items():
+            free = np.full(self.w.size, p)
+            if slot in exclusive:
+                free[(self.rows == slot).any(axis=1) | (self.pinned == slot).any()] = 0.0
+            outside -= free
+            there = np.flatnonzero(free)
+            parents.append(there)
+            to.append(np.full(there.size, slot, np.int32))
+            masses.append(self.w[there] * free[there])
+        out = still[outside > 0.0]
+        parent = np.concatenate([out, *parents])
+        column = np.concatenate([np.zeros(out.size, np.int32), *to])
+        w = np.concatenate([self.w[out] * outside[out], *masses])
+        if (column == column[0]).all():
+            return Hypotheses(self.rows, self.w, self.cols, np.append(self.pinned, column[0]))
+        rows = np.column_stack([self.rows[parent], column]).astype(np.int32)
+        cols, pinned = np.append(self.cols, np.int32(obj)), np.append(self.pinned, np.int32(-1))
+        return Hypotheses(np.ascontiguousarray(rows), w / w.sum(), cols, pinned)
 
     def everything(self) -> Children:
         """The present set as children in which nothing moved."""

@@ -42,6 +42,7 @@ def appeared(world: World, event: LabelAppeared, p_jump: float | None) -> Steps:
         u=max(1.0 - phantom - jump, 0.0),
         stay=phantom,
         jump=(jump, slot),
+        from_outside=p_jump is not None,
         likelihood=likelihood,
     )
     yield Step(children, ceiling=float(likelihood.max()))
@@ -78,6 +79,7 @@ def _give(
     stay: float,
     likelihood: Array,
     jump: tuple[float, int] = (0.0, -1),
+    from_outside: bool = False,
     idle_to_stay: bool = False,
 ) -> Children:
     belief, slots = world.belief, world.labels.n_slots
@@ -88,7 +90,7 @@ def _give(
     pin_obj = np.flatnonzero(where >= 0).astype(np.int32)
     p_jump, new = jump
     if p_jump > 0.0:
-        jumpable = world.labels.shelf()
+        jumpable = np.zeros(slots + 1, np.bool_) if from_outside else world.labels.shelf()
         jumpable[OUT_SLOT] = True
         jumpable[new] = False
         jumpable[-1] = False

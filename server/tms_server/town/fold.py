@@ -14,8 +14,8 @@ from pydantic import TypeAdapter, ValidationError
 from tms_schemas import events
 from tms_server.log.record import ORIGIN, Position, Record
 from tms_server.log.registry import REGISTRY, registry_body
-from tms_server.placement import DrawKey, Engine, InvalidEvent, Parameters
-from tms_server.town import inventory, packing, registry, reports
+from tms_server.placement import OUT, DrawKey, Engine, InvalidEvent, Parameters
+from tms_server.town import inventory, packing, registry, reports, sight
 from tms_server.town.resolve import UnknownMover, resolved
 from tms_server.town.state import AgentInfo, Evidence, Fault, LabelInfo, RoomState
 
@@ -68,7 +68,9 @@ class RoomFold:
             return
         try:
             event = resolved(event, self.state.labels)
-            self._give(event, self._unseen(event) if p_jump is None else p_jump)
+            if sight.is_first(event, self):
+                p_jump = sight.P_UNSEEN
+            self._give(event, p_jump)
         except UnknownMover as error:
             self.note("unknown_mover", f"{event.type}: {error}")
         except InvalidEvent as error:
@@ -92,6 +94,10 @@ class RoomFold:
         if tag in self.state.names:
             self.state.evidence[tag] = Evidence(record.agent, record.seq, record.kind, label, record.observed_at)
 
+    def marginal(self, tag: str) -> dict[str, float]:
+        """Label -> probability of one tracked object; KeyError where the room does not track it."""
+        return {OUT: 1.0} if tag in self.state.unseen else self.engine.marginal(tag)
+
     def copy(self) -> RoomFold:
         """An independent fold in the same state; cheap."""
         twin = RoomFold.__new__(RoomFold)
@@ -111,16 +117,6 @@ class RoomFold:
         twin.engine = Engine.from_bytes(engine)
         twin._record, twin._parts = None, 0
         return twin
-
-    def _unseen(self, event: events.Event) -> float | None:
-        """Nobody is known to be in the room, yet a reader named a thing: somebody unseen put it there.
-
-        Rooms with cabinets and no floor sensor live by this. Where nothing was read, it would only spread doubt.
-        """
-        if not isinstance(event, events.LabelAppeared) or event.tag is None:
-            return None
-        watched = any(info.kind == "mover" for info in self.state.labels.values())
-        return None if watched else inventory.P_JUMP
 
     def _give(self, event: events.Event, p_jump: float | None) -> None:
         record, seed = self.record, self.state.room.seed if self.state.room else 0

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 from tms_schemas.events import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft, TagObserved
 from tms_schemas.observation import Inventory, InventoryLabel
 from tms_server.log.record import Record
+from tms_server.town.sight import P_UNSEEN
 
 if TYPE_CHECKING:
     from tms_server.town.fold import RoomFold
-
-#: While nobody watched, a thing may have come from anywhere: probability that a new label was a jump.
-P_JUMP = 0.5
 
 
 def reconcile(fold: RoomFold, record: Record) -> None:
@@ -35,7 +33,7 @@ def reconcile(fold: RoomFold, record: Record) -> None:
         if item.kind != "mover":
             read = {} if item.tag is None else {"tag": item.tag}
             appeared = LabelAppeared(label=item.label, kind=item.kind, **_place(item), **read)
-            fold.fold(appeared, p_jump=P_JUMP)
+            fold.fold(appeared, p_jump=P_UNSEEN)
     for name, info in known.items():
         tag = items[name].tag if name in items else None
         if tag is not None and tag != info.tag:

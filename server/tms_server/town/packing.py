@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
+from dataclasses import asdict
 from typing import Any
 
 from tms_schemas.rooms import RoomIn
 from tms_server.log.record import Position
+from tms_server.placement import ObjectSpec
 from tms_server.town.state import AgentInfo, Evidence, Fault, LabelInfo, RoomState
 
 _MAGIC = b"TMS room 1\n"
@@ -20,6 +22,7 @@ def pack(state: RoomState, position: Position, engine: bytes) -> bytes:
         "position": position,
         "room": None if state.room is None else state.room.model_dump_json(by_alias=True),
         "names": state.names,
+        "unseen": [asdict(spec) for spec in state.unseen.values()],
         "labels": state.labels,
         "agents": state.agents,
         "evidence": state.evidence,
@@ -46,6 +49,7 @@ def unpack(data: bytes) -> tuple[RoomState, Position, bytes]:
     state = RoomState(
         room=None if room is None else RoomIn.model_validate_json(room),
         names=document["names"],
+        unseen={row["id"]: ObjectSpec(**row) for row in document["unseen"]},
         labels={name: _label(row) for name, row in document["labels"].items()},
         agents={name: AgentInfo(*row) for name, row in document["agents"].items()},
         evidence={tag: Evidence(*row) for tag, row in document["evidence"].items()},

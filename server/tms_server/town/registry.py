@@ -15,7 +15,8 @@ def apply(fold: RoomFold, body: RegistryBody) -> None:
     match body:
         case ObjectRemoved(tag=tag):
             if fold.state.names.pop(tag, None) is not None:
-                fold.engine.remove_object(tag)
+                if fold.state.unseen.pop(tag, None) is None:
+                    fold.engine.remove_object(tag)
                 fold.state.evidence.pop(tag, None)
         case RoomChanged(room=room):
             fold.state.room = room
@@ -31,8 +32,8 @@ def apply(fold: RoomFold, body: RegistryBody) -> None:
                 weight_sd_g=body.weight_sd_g,
                 size_m=body.size_m,
             )
-            if body.tag in fold.state.names:
+            if body.tag in fold.state.names and body.tag not in fold.state.unseen:
                 fold.engine.change_object(spec)
             else:
-                fold.engine.add_object(spec)
+                fold.state.unseen[body.tag] = spec
             fold.state.names[body.tag] = body.name

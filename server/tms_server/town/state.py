@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from tms_schemas.events import Covariance, Kind
 from tms_schemas.rooms import RoomIn
+from tms_server.placement import ObjectSpec
 from tms_server.town.geometry import Point
 
 #: Anomalies kept, the newest.
@@ -63,6 +64,8 @@ class RoomState:
 
     room: RoomIn | None = None
     names: dict[str, str] = field(default_factory=dict)
+    #: Tracked objects that no reader in this room ever named: OUT, and no burden on the belief engine.
+    unseen: dict[str, ObjectSpec] = field(default_factory=dict)
     labels: dict[str, LabelInfo] = field(default_factory=dict)
     agents: dict[str, AgentInfo] = field(default_factory=dict)
     evidence: dict[str, Evidence] = field(default_factory=dict)
@@ -77,6 +80,7 @@ class RoomState:
         return replace(
             self,
             names=dict(self.names),
+            unseen=dict(self.unseen),
             labels=dict(self.labels),
             agents=dict(self.agents),
             evidence=dict(self.evidence),

@@ -73,7 +73,7 @@ class RoomView:
         """Label -> probability of one object (``OUT`` is no label); KeyError where the room does not track it."""
         marginals = self.frozen.marginals
         if tag not in marginals:
-            found = self.fold.engine.marginal(tag)
+            found = self.fold.marginal(tag)
             marginals[tag] = {label: p for label, p in found.items() if p >= _SLIVER}
         return marginals[tag]
 

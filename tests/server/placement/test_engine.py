@@ -268,11 +268,35 @@ def test_a_live_room_learns_where_an_unseen_object_is() -> None:
     assert engine.marginal("a")["L"] > 0.99
 
 
-def test_an_inventory_label_is_found_by_a_jump() -> None:
+def test_what_was_outside_is_found_by_a_jump_of_its_own() -> None:
+    """``p_jump`` of an event moves what is outside; what stands in a cabinet stays there."""
     engine = small()
-    found = event("label_appeared", label="L", kind="cabinet", xy=[0, 0], tag="Ta")
+    engine.add_object(ObjectSpec(id="d", tag="Td"))
+    found = event("label_appeared", label="L", kind="cabinet", xy=[0, 0], tag="Td")
     assert not engine.apply(found, key(0), p_jump=1.0).contradiction
-    assert engine.marginal("a")["L"] > 0.95
+    assert engine.marginal("d")["L"] == 1.0
+    assert all(engine.marginal(n) == {f"A{n}": 1.0} for n in "abc")
+
+
+@given(seeds, st.floats(0.01, 0.33))
+@settings(max_examples=40, deadline=None)
+def test_an_object_may_join_at_several_places(seed: int, p: float) -> None:
+    """The prior is respected, occupied labels are refused, the others' marginals stay, and all still sums to 1."""
+    scenario = world(seed)
+    engine = engine_of(scenario, None)
+    for e in scenario.events[:5]:
+        engine.apply(e, key(0))
+    before, free = engine.marginals(), {}
+    places = [name for name, state in engine.labels.items() if not state.ghost][:3]
+    for name in places:
+        occupied = sum(m.get(name, 0.0) for m in before.values()) if engine.labels[name].kind != "mover" else 0.0
+        free[name] = p * (1.0 - occupied)
+    engine.add_object(ObjectSpec(id="new", tag="NEW"), dict.fromkeys(places, p))
+    after = engine.marginals()
+    mine = after.pop("new")
+    assert after == {o: pytest.approx(m) for o, m in before.items()}
+    assert mine.get("OUT", 0.0) == pytest.approx(1.0 - sum(free.values()))
+    assert all(mine.get(name, 0.0) == pytest.approx(q, abs=1e-12) for name, q in free.items())
 
 
 def test_a_person_corrects_the_belief() -> None:

@@ -1,0 +1,47 @@
+"""Things that come into a room unseen, and things that are seen in it for the first time.
+
+A tracked object that no reader here ever named is outside, certainly; the belief engine carries it only from its first
+read on. So a catalogue of thousands costs nothing, and the first read of a thing is believed: somebody brought it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from tms_schemas import events
+
+if TYPE_CHECKING:
+    from tms_server.town.fold import RoomFold
+
+#: Probability that a thing came from outside where nobody was there to bring it, or to see who did.
+P_UNSEEN = 0.5
+
+
+def is_first(event: events.Event, fold: RoomFold) -> bool:
+    """Whether ``event`` is a label whose content probably came from outside.
+
+    Either a reader names a thing that was never seen here, or no mover is known: rooms with cabinets and no floor
+    sensor live by that. Objects that the event shows for the first time are given to the belief engine.
+    """
+    match event:
+        case events.LabelAppeared():
+            first = event.tag is not None and _introduce(event.tag, [], fold)
+            return first or not any(info.kind == "mover" for info in fold.state.labels.values())
+        case events.TagObserved():
+            _introduce(event.tag, [event.label] if event.label is not None else event.labels or [], fold)
+        case events.Handover(tag=str(tag), from_=str(giver)):
+            _introduce(tag, [giver], fold)
+        case events.Correction(present=True):
+            _introduce(event.tag, [event.label], fold)
+    return False
+
+
+def _introduce(tag: str, labels: Sequence[str], fold: RoomFold) -> bool:
+    """Give an object to the engine: outside, or as probably at one of ``labels``. False where the engine has it."""
+    spec = fold.state.unseen.pop(tag, None)
+    if spec is None:
+        return False
+    active = [label for label in labels if fold.state.active(label) is not None]
+    fold.engine.add_object(spec, {label: P_UNSEEN / len(active) for label in active})
+    return True
