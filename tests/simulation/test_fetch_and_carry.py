@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with ServerProcess(folder) as server, Town(server.url) as town:
         register(town, Plan())
         with posted(town, "demo", folder / "spools", 0, weigh=False) as (agents, posters):
-            player = Player(new_world(), agents, speed=20.0)
+            player = Player(new_world(), agents, speed=20.0, clock=lambda: datetime.now(UTC))
             player.switch_on()
             for step in STEPS[:4]:
                 player.play(step.act(player.world))

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -42,7 +43,7 @@ def story(url: str, folder: Path) -> Iterator[Story]:
     with Town(url) as town:
         register(town, Plan())
         with posted(town, "demo", folder / "spools", 0, weigh=False) as (agents, posters):
-            player = Player(new_world(), agents, speed=10.0)
+            player = Player(new_world(), agents, speed=10.0, clock=lambda: datetime.now(UTC))
             player.switch_on()
             yield Story(player, posters)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import tempfile
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,7 @@ from tms_client.cli import CommandError
 from tms_schemas.objects import ObjectFields, ProductIn
 
 DELIVERY_S = 60.0
+UTC_NOW = functools.partial(datetime.now, UTC)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -40,7 +44,7 @@ class Plan:
     seed: int = 0
 
 
-def run(plan: Plan, terminal: Terminal) -> bool:
+def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW) -> bool:
     """Play the story; True where every pie was as expected. Goes on living until Ctrl-C unless ``plan.once``."""
     with ExitStack() as stack:
         work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tms-demo-")))
@@ -50,7 +54,7 @@ def run(plan: Plan, terminal: Terminal) -> bool:
         try:
             register(town, plan)
             watched, posters = stack.enter_context(posted(town, plan.room, work, plan.seed, weigh=plan.weights))
-            player = Player(new_world(), watched, speed=plan.speed)
+            player = Player(new_world(), watched, speed=plan.speed, clock=clock)
             right = _story(town, player, posters, plan, terminal)
             if not plan.once:
                 terminal.say(f"\nThe room lives on; look at {url}/ (Ctrl-C ends it).")
