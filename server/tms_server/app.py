@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TypedDict
@@ -23,6 +25,7 @@ from tms_server.limits import BodyLimit
 from tms_server.live.endpoints import router as live_router
 from tms_server.live.feed import Feeds
 from tms_server.objects.endpoints import router as objects_router
+from tms_server.placement import warm_up
 from tms_server.rooms.endpoints import router as rooms_router
 from tms_server.settings import Settings
 from tms_server.town import Town, open_town
@@ -53,6 +56,7 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
         try:
             async with own_database(engine):
                 await migrate(engine)
+                await asyncio.to_thread(warm_up, _say)
                 sessions = Sessions(engine)
                 async with open_town(engine, sessions, settings, clock) as town:
                     yield State(
@@ -77,3 +81,9 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
     apidocs.install(app)
     install_page(app)
     return app
+
+
+def _say(message: str) -> None:
+    """For the person who waits for the first start."""
+    sys.stderr.write(f"tms: {message}\n")
+    sys.stderr.flush()

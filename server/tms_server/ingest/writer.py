@@ -75,10 +75,12 @@ class GroupWriter:
     async def _write(self, group: list[_Waiting]) -> None:
         try:
             verdicts = await self._log.append([waiting.batch for waiting in group])
-        except TmsError as error:
-            _log.error("%d batches refused: %s", len(group), error, exc_info=error.__cause__)
+        except Exception as error:
+            # Whatever it was, the writer goes on: without it every agent would wait for ever.
+            _log.error("%d batches refused: %s", len(group), error, exc_info=error.__cause__ or error)
+            known = error if isinstance(error, TmsError) else Unavailable("the log cannot be written", retry_after_s=5)
             # An exception of its own for each: a raised one grows a traceback per waiter.
-            verdicts = [Unavailable(error.detail, retry_after_s=error.retry_after_s) for _ in group]
+            verdicts = [Unavailable(known.detail, retry_after_s=known.retry_after_s) for _ in group]
         for waiting, verdict in zip(group, verdicts, strict=True):
             if waiting.verdict.done():  # the client went away; what was recorded is a duplicate when it comes back
                 continue
