@@ -14,6 +14,7 @@ from typing import Any
 import httpx
 import pytest
 from server_process import ServerProcess
+
 from tms_server.clock import SystemClock
 from tms_server.db.engine import create_engine
 from tms_server.log.record import Record

@@ -62,9 +62,7 @@ async def test_the_same_observation_in_another_room_is_a_conflict(http: httpx.As
 async def test_a_refused_batch_does_not_touch_those_beside_it(http: httpx.AsyncClient, post, seen) -> None:
     """Posted together, they share a transaction."""
     await post(seen(0))
-    good = [
-        post(seen(n, label=f"a{n}/1", type="mover_entered", xy=[0, 0]), agent=f"a{n}") for n in range(10)
-    ]
+    good = [post(seen(n, label=f"a{n}/1", type="mover_entered", xy=[0, 0]), agent=f"a{n}") for n in range(10)]
     answers = await asyncio.gather(*good, post({**seen(0), "xy": [9, 9]}), post(seen(1), room="nowhere"))
     assert [answer.status_code for answer in answers] == [200] * 10 + [409, 404]
     page = (await http.get("/v1/agents")).json()

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from tms_schemas.rooms import RoomIn
 from tms_server.clock import SystemClock
 from tms_server.db.engine import create_engine
@@ -56,6 +57,7 @@ class Lab:
             session.add(RoomRow(room=room, body=body.model_dump_json(), created_at=0, updated_at=0))
             await append_registry(session, room, RoomChanged(room=body), now=SystemClock().now())
             await session.commit()
+        self.town.poke(room)
         for tag in tags:
             await self.registry(ObjectRegistered(tag=tag, name=tag), room)
 

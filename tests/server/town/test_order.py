@@ -12,7 +12,12 @@ from hypothesis import strategies as st
 
 TAGS = ["E1", "E2", "E3"]
 # No shrinking: an example is a second of real appends, and its seed says all.
-FEW = settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), phases=[Phase.explicit, Phase.reuse, Phase.generate])
+FEW = settings(
+    max_examples=12,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    phases=[Phase.explicit, Phase.reuse, Phase.generate],
+)
 
 
 class Story:
@@ -83,9 +88,7 @@ def arrivals(story: Story, shuffle: random.Random, suffix: str) -> list[tuple[st
 
 
 def _renamed(events: list[dict[str, Any]], old: str, new: str) -> list[dict[str, Any]]:
-    return [
-        {**event, "label": event["label"].replace(old, new, 1)} if "label" in event else event for event in events
-    ]
+    return [{**event, "label": event["label"].replace(old, new, 1)} if "label" in event else event for event in events]
 
 
 @FEW
@@ -127,7 +130,9 @@ async def test_a_restart_in_between_changes_nothing(open_lab, at, seed: int, shu
 async def test_held_back_records_are_folded_once_in_order(open_lab, at) -> None:
     async with open_lab(holdback_s=3600.0 * 24 * 365 * 50) as lab:
         await lab.room(tags=["E1"])
-        await lab.post("floor", {"seq": 0, "observed_at": at(1), "type": "mover_entered", "label": "floor/1", "xy": [1, 1]})
+        await lab.post(
+            "floor", {"seq": 0, "observed_at": at(1), "type": "mover_entered", "label": "floor/1", "xy": [1, 1]}
+        )
         assert (await lab.belief()).movers().movers == []
     async with open_lab(holdback_s=0.2) as lab:
         view = await lab.belief()
