@@ -6,17 +6,46 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
-from tms_schemas.base import Model
 from tms_schemas.belief import LabelView, MoverView, ObjectPlacement
 from tms_schemas.live import SnapshotFrame, StateFrame
+from tms_schemas.rooms import RoomIn
+from tms_server.town.state import LabelInfo
 from tms_server.town.views import RoomView
 
 Part = TypeVar("Part", ObjectPlacement, LabelView, MoverView)
 _CACHED = 32
 #: Slices below this are not drawn and do not count as moved.
 _UNSEEN = 1e-3
+
+
+class Basis(NamedTuple):
+    """What a version was made from; rows that did not change are the same objects in the next state of the room."""
+
+    room: RoomIn | None
+    names: Mapping[str, str]
+    labels: Mapping[str, tuple[LabelInfo, bool]]
+    marginals: Mapping[str, Mapping[str, float]]
+
+    @classmethod
+    def of(cls, view: RoomView) -> Basis:
+        state = view.fold.state
+        labels = {name: (info, view.places.stale(info)) for name, info in state.labels.items()}
+        return cls(state.room, state.names, labels, {tag: view.marginal(tag) for tag in view.tags})
+
+    def changed_labels(self, before: Basis) -> set[str]:
+        """Labels that are new, gone, moved, or silent now and were not before."""
+        if self.room is not before.room:
+            return {*self.labels, *before.labels}
+        return {
+            name
+            for name in self.labels.keys() | before.labels.keys()
+            if (new := self.labels.get(name)) is None
+            or (old := before.labels.get(name)) is None
+            or new[0] is not old[0]
+            or new[1] != old[1]
+        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,22 +58,27 @@ class Version:
     objects: Mapping[str, ObjectPlacement]
     labels: Mapping[str, LabelView]
     movers: Mapping[str, MoverView]
+    basis: Basis
 
     @classmethod
     def of(cls, view: RoomView, before: Version | None) -> Version:
         """The version of a view; ``before`` itself where nothing at all is different."""
-        objects = {one.tag: one for one in view.placements().objects}
-        labels = {one.label: one for one in view.labels().labels}
+        basis = Basis.of(view)
         movers = {one.label: one for one in view.movers().movers}
         if before is None:
-            return cls(view.room, view.cursor, view.at, objects, labels, movers)
+            objects = {one.tag: one for one in view.placements().objects}
+            labels = {one.label: one for one in view.labels().labels}
+            return cls(view.room, view.cursor, view.at, objects, labels, movers, basis)
+        moved = basis.changed_labels(before.basis)
+        objects = {tag: _placement(tag, view, basis, before, moved) for tag in view.tags}
         new = cls(
             view.room,
             view.cursor,
             view.at,
-            _shared(objects, before.objects),
-            _shared(labels, before.labels),
+            objects,
+            _labels(view, basis, before, moved),
             _shared(movers, before.movers),
+            basis,
         )
         same = (new.cursor, new.at) == (before.cursor, before.at) and not changed(new, before)
         return before if same else new
@@ -115,26 +149,33 @@ class Encoder:
             self._frames.popitem(last=False)
 
 
+def _placement(tag: str, view: RoomView, basis: Basis, before: Version, moved: set[str]) -> ObjectPlacement:
+    """The pie of before where it would look the same: making all of them anew for each step of a walker is dear.
+
+    A slice that nobody sees does not count as moved.
+    """
+    old, marginal = before.objects.get(tag), basis.marginals[tag]
+    if (
+        old is not None
+        and old.name == basis.names[tag]
+        and marginal == before.basis.marginals[tag]
+        and not any(label in moved and p >= _UNSEEN for label, p in marginal.items())
+    ):
+        return old
+    return view.placement(tag)
+
+
+def _labels(view: RoomView, basis: Basis, before: Version, moved: set[str]) -> Mapping[str, LabelView]:
+    still = moved.isdisjoint(before.labels) and all(
+        name in basis.labels and basis.labels[name][0].kind == "mover" for name in moved
+    )
+    if still and basis.marginals == before.basis.marginals:
+        return before.labels
+    return _shared({one.label: one for one in view.labels().labels}, before.labels)
+
+
 def _shared(parts: dict[str, Part], before: Mapping[str, Part]) -> dict[str, Part]:
-    return {
-        key: old if (old := before.get(key)) is not None and _same(part, old) else part for key, part in parts.items()
-    }
-
-
-def _same(new: Model, old: Model) -> bool:
-    if isinstance(new, ObjectPlacement) and isinstance(old, ObjectPlacement):
-        return _same_pie(new, old)
-    return new == old
-
-
-def _same_pie(new: ObjectPlacement, old: ObjectPlacement) -> bool:
-    """Equal, or only slices moved that nobody sees: else all pies would come anew with every step of a walker."""
-    if new == old:
-        return True
-    if new.name != old.name or len(new.distribution) != len(old.distribution):
-        return False
-    pairs = zip(new.distribution, old.distribution, strict=True)
-    return all(a == b or (a.label == b.label and a.p == b.p and a.p < _UNSEEN) for a, b in pairs)
+    return {key: old if (old := before.get(key)) is not None and old == part else part for key, part in parts.items()}
 
 
 def _changed(new: Mapping[str, Part], old: Mapping[str, Part]) -> list[Part]:
