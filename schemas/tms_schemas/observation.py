@@ -143,10 +143,13 @@ AnyObservation = Annotated[Observation, Field(discriminator="type")]
 
 def labels_named(observation: Observation) -> list[str]:
     """Every label that the observation names; on the wire all of them must be the agent's own."""
+    fields = _LABEL_FIELDS[type(observation)]
+    if fields == ("label",):  # most observations
+        return [observation.label]  # type: ignore[union-attr,list-item]
     if isinstance(observation, Inventory):
         return [item.label for item in observation.labels]
     names: list[str] = []
-    for field in _LABEL_FIELDS[type(observation)]:
+    for field in fields:
         value = getattr(observation, field)
         if isinstance(value, str):
             names.append(value)

@@ -8,7 +8,6 @@ from pydantic import ValidationError
 from pydantic_core import from_json
 
 from tms_schemas.observation import (
-    AgentState,
     Handover,
     Inventory,
     LabelAppeared,
@@ -54,12 +53,14 @@ def _item(observation: Observation) -> Item:
         observation.type,
         body,
         _tag_reads(observation),
-        (observation.state, observation.why.replace("\0", "")) if isinstance(observation, AgentState) else None,
+        (observation.state, observation.why.replace("\0", "")) if observation.type == "agent_state" else None,
     )
 
 
 def _tag_reads(observation: Observation) -> tuple[TagRead, ...]:
     """The tags it read, each once."""
+    if observation.type not in _READS:
+        return ()
     match observation:
         case LabelAppeared(tag=str(tag), label=label, xy=(x, y)):
             return (TagRead(tag, label, x, y),)
@@ -71,6 +72,10 @@ def _tag_reads(observation: Observation) -> tuple[TagRead, ...]:
             reads = [TagRead(i.tag, i.label, i.xy[0], i.xy[1]) for i in labels if i.tag is not None]
             return tuple({read.tag: read for read in reads}.values())
     return ()
+
+
+#: Types that may read a tag; asking for the class of every observation would cost more than all the rest.
+_READS = frozenset({"label_appeared", "tag_observed", "raw_read", "handover", "inventory"})
 
 
 def _foreign_labels(batch: ObservationBatch) -> list[ProblemItem]:

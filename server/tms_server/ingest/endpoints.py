@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fastapi import APIRouter, Request
+from starlette.responses import Response
 
 from tms_schemas.observation import BatchAccepted, ObservationBatch
 from tms_server.auth import Caller, require_observe
@@ -31,8 +32,8 @@ def _request_body() -> dict[str, Any]:
 
 
 # The body is validated once, from its bytes: letting the framework parse it to Python objects first costs more.
-@router.post("/observations", openapi_extra={"requestBody": _request_body()})
-async def post_observations(request: Request, caller: Caller) -> BatchAccepted:
+@router.post("/observations", response_model=BatchAccepted, openapi_extra={"requestBody": _request_body()})
+async def post_observations(request: Request, caller: Caller) -> Response:
     """Record a batch of one agent in one room, whole or not at all; answered once it is durable.
 
     The same (agent, seq) with the same body again counts as a duplicate; with another body it is a conflict (409)
@@ -42,4 +43,5 @@ async def post_observations(request: Request, caller: Caller) -> BatchAccepted:
     require_observe(caller, batch.room)
     town: Town = request.state.town
     done = await town.writer.submit(batch)
-    return BatchAccepted(accepted=done.accepted, duplicates=done.duplicates, head=done.head, too_late=done.too_late)
+    answer = BatchAccepted(accepted=done.accepted, duplicates=done.duplicates, head=done.head, too_late=done.too_late)
+    return Response(answer.model_dump_json(), media_type="application/json")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Iterable, Sequence
 from functools import partial
 from typing import Any
@@ -54,6 +54,8 @@ class SqlRoomLog:
         )
         self._tail = Tail()
         self._committed: dict[str, int] = {}
+        #: How often somebody said that records came by another way than ``append``.
+        self._outside: Counter[str] = Counter()
         self._news: defaultdict[str, asyncio.Event] = defaultdict(asyncio.Event)
 
     async def append(self, batches: Sequence[Batch]) -> list[Verdict]:
@@ -65,13 +67,18 @@ class SqlRoomLog:
         self._committed.update(plan.heads)
         self._tail.add(plan.records)
         for room in plan.heads:
-            self.poke(room)
+            self._wake(room)
         return plan.verdicts
 
     async def follow(self, room: str, after: int) -> AsyncIterator[list[Record]]:
+        looked: int | None = None
         while True:
-            news = self._news[room]
-            page = self._tail.after(room, after, PAGE) or await self.read(room, after, PAGE)
+            # Both are taken before looking: what comes meanwhile is news.
+            news, outside = self._news[room], self._outside[room]
+            page = self._tail.after(room, after, PAGE)
+            if not page and (looked != outside or self._committed.get(room, 0) > after):
+                page = await self.read(room, after, PAGE)
+                looked = None if page else outside
             if page:
                 after = page[-1].offset
                 yield page
@@ -80,7 +87,7 @@ class SqlRoomLog:
                 async with asyncio.timeout(_LOOK_AGAIN_S):
                     await news.wait()
             except TimeoutError:
-                continue
+                looked = None
 
     async def read(self, room: str, after: int, limit: int) -> list[Record]:
         query = select(*_COLUMNS).where(LogRow.room == room, LogRow.offset > after).order_by(LogRow.offset)
@@ -126,6 +133,10 @@ class SqlRoomLog:
         return self._committed.get(room, 0)
 
     def poke(self, room: str) -> None:
+        self._outside[room] += 1
+        self._wake(room)
+
+    def _wake(self, room: str) -> None:
         # Whoever waits holds this event; the next to wait gets a fresh one, so no news falls between.
         self._news.pop(room, asyncio.Event()).set()
 

@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 #: Seconds that a query waits for the fold to catch up before it is told to come back.
 _PATIENCE_S = 30.0
 _LAST_SEQ = 2**63 - 1
-_position = attrgetter("position")
+_position = attrgetter("observed_at", "agent", "seq")
 _observed_at = attrgetter("observed_at")
 
 
