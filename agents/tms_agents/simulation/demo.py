@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -98,6 +99,9 @@ def _story(town: Town, player: Player, posters: list[Poster], plan: Plan, termin
 
 def _delivered(posters: list[Poster]) -> None:
     """Wait until the server has acknowledged everything observed so far."""
-    for poster in posters:
-        if not poster.drain(DELIVERY_S):
-            raise CommandError(f"agent {poster.spool.agent} cannot deliver: {poster.trouble or 'timed out'}")
+    deadline = time.monotonic() + DELIVERY_S
+    while waiting := [poster for poster in posters if len(poster.spool)]:
+        if time.monotonic() > deadline:
+            first = waiting[0]
+            raise CommandError(f"agent {first.spool.agent} cannot deliver: {first.trouble or 'no answer'}")
+        time.sleep(0.01)
