@@ -14,7 +14,7 @@ help:
 	@echo "make faults    the long fault tests (30 kills and more)"
 
 demo: $(READY)
-	$(BIN)/tms demo --port 8080 $(DEMO)
+	$(BIN)/tms demo $(DEMO)
 
 test: $(READY) chromium check
 	$(BIN)/python -m pytest -n $(or $(TEST_JOBS),2) $(PYTEST)

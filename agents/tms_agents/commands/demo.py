@@ -29,10 +29,10 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--url", help="use this running server instead of starting one")
     parser.add_argument("--key", help="API key for --url (scope admin)")
     parser.add_argument("--room", default="demo", help="id of the room (default demo)")
-    parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
+    parser.add_argument("--port", type=int, help="port of the server, 0 for a free one (default: 8080 if it is free)")
     parser.add_argument("--data-dir", type=Path, help="keep the server's data here (default: thrown away)")
     arguments = parser.parse_args(argv)
-    if arguments.url and (arguments.port or arguments.data_dir):
+    if arguments.url and (arguments.port is not None or arguments.data_dir):
         raise CommandError("--port and --data-dir are for a server of our own, not with --url")
     if arguments.seed < 0:
         raise CommandError(f"--seed must not be negative, got {arguments.seed}")

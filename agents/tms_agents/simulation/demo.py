@@ -32,12 +32,15 @@ UTC_NOW = functools.partial(datetime.now, UTC)
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Plan:
-    """How to play: against ``url`` or a server of our own on ``port`` (0: a free one) with its data in ``data_dir``."""
+    """How to play: against ``url``, or a server of our own with its data in ``data_dir``.
+
+    ``port``: 0 is a free one; None is the usual one, or a free one where that is taken.
+    """
 
     url: str | None = None
     key: str | None = None
     room: str = "demo"
-    port: int = 0
+    port: int | None = None
     data_dir: Path | None = None
     weights: bool = False
     once: bool = False

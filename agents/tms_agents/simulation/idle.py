@@ -1,4 +1,4 @@
-"""After the story: an ordinary afternoon. The person walks about, now and then carries a thing to another cabinet."""
+"""After the story: an ordinary afternoon. The person walks about; later, now and then, a thing changes cabinets."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from tms_agents.simulation.story import Script, wait, walk
 from tms_agents.simulation.world import InCabinet, World
 
 _FRONTS = {"cabinet-a": "front of A", "cabinet-b": "front of B", "cabinet-c": "front of C"}
+#: For so long nothing is carried about, so that what the story ended with can be looked at.
+_AS_THE_STORY_LEFT_IT_S = 300.0
 _STROLL = ("middle", "north", "bed", "east", "south")
 
 
@@ -16,9 +18,10 @@ def afternoon(world: World, rng: np.random.Generator) -> Script:
     """Never ends. Starts where the story left the two."""
     yield from walk(world, ROBOT, "table side", "dock")
     here = "front of B"
+    started = world.time_s
     while True:
         yield from wait(world, float(rng.uniform(3.0, 8.0)))
-        if rng.random() < 0.5:
+        if world.time_s < started + _AS_THE_STORY_LEFT_IT_S or rng.random() < 0.5:
             there = str(rng.choice([spot for spot in _STROLL if spot != here]))
             yield from walk(world, PERSON, here, there)
             here = there

@@ -6,6 +6,7 @@ import contextlib
 import os
 import queue
 import re
+import socket
 import subprocess
 import sys
 import threading
@@ -21,15 +22,20 @@ from tms_client.cli import CommandError
 
 _ADDRESS = re.compile(r"(http://\S+)")
 START_S = 120.0
+USUAL_PORT = 8080
 
 
 @contextmanager
-def server(data_dir: Path, port: int, say: Callable[[str], None]) -> Iterator[str]:
+def server(data_dir: Path, port: int | None, say: Callable[[str], None]) -> Iterator[str]:
     """Run ``tms serve`` on loopback; its URL. Stopped at the end, by force where it does not listen.
+
+    Without a ``port`` it is the usual one, or a free one where that is taken.
 
     Raises:
         CommandError: it did not come up; the message has its last words.
     """
+    if port is None:
+        port = USUAL_PORT if _is_free(USUAL_PORT) else 0
     environment = dict(os.environ)
     # The data may be thrown away after the demo, the compiled code is worth keeping.
     environment.setdefault("NUMBA_CACHE_DIR", str(_cache()))
@@ -66,6 +72,14 @@ def _ready(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> st
         if url is not None and _answers(url):
             return url
     raise CommandError(f"the server did not come up within {START_S:.0f} s: {last}")
+
+
+def _is_free(port: int) -> bool:
+    try:
+        socket.create_server(("127.0.0.1", port)).close()
+    except OSError:
+        return False
+    return True
 
 
 def _answers(url: str) -> bool:
