@@ -15,6 +15,8 @@ class Model(BaseModel):
 
 
 def _to_utc(value: datetime) -> datetime:
+    if not value.utcoffset():
+        return value.replace(tzinfo=UTC)  # nearly always, and cheaper
     try:
         return value.astimezone(UTC)
     except OverflowError:
