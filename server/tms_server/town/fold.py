@@ -70,7 +70,7 @@ class RoomFold:
             event = resolved(event, self.state.labels)
             if sight.is_first(event, self):
                 p_jump = sight.P_UNSEEN
-            self._give(event, p_jump)
+            self._give(sight.as_content(event, self), p_jump)
         except UnknownMover as error:
             self.note("unknown_mover", f"{event.type}: {error}")
         except InvalidEvent as error:

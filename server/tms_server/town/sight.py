@@ -37,6 +37,16 @@ def is_first(event: events.Event, fold: RoomFold) -> bool:
     return False
 
 
+def as_content(event: events.Event, fold: RoomFold) -> events.Event:
+    """The event for the engine, to which a tag that is not registered says nothing.
+
+    A new label whose reader names such a tag holds something unregistered, most likely: no tracked object was read.
+    """
+    if isinstance(event, events.LabelAppeared) and event.tag is not None and event.tag not in fold.state.names:
+        return event.model_copy(update={"tag": None})
+    return event
+
+
 def _introduce(tag: str, labels: Sequence[str], fold: RoomFold) -> bool:
     """Give an object to the engine: outside, or as probably at one of ``labels``. False where the engine has it."""
     spec = fold.state.unseen.pop(tag, None)

@@ -67,3 +67,12 @@ async def test_a_large_catalogue_costs_nothing(lab, at):
     view = await lab.belief()
     assert len(view.fold.engine.objects) == 1
     assert len(view.placements().objects) == 300
+
+
+async def test_a_label_that_names_an_unregistered_tag_holds_no_tracked_thing(lab, at):
+    """What was taken is outside and might come back; the tag that is read says that this is something else."""
+    await lab.room(tags=["T1"])
+    await lab.post("cab", appeared(1, at(1), "cab/1", tag="T1"))
+    await lab.post("cab", {"seq": 2, "observed_at": at(2), "type": "label_vanished", "label": "cab/1"})
+    await lab.post("cab", appeared(3, at(3), "cab/2", tag="STRANGE"))
+    assert (await lab.belief()).marginal("T1")["OUT"] > 0.94
