@@ -29,7 +29,7 @@ PROGRAMS = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", README, re.DOTALL
 def demo() -> Iterator[str]:
     """The demo after its story; its address."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tms_client", "demo", "--speed", "20", "--port", "0"], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "tms_client", "demo", "--speed", "5", "--port", "0"], stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
     url = ""

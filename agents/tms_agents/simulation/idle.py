@@ -10,7 +10,7 @@ from tms_agents.simulation.world import InCabinet, World
 
 _FRONTS = {"cabinet-a": "front of A", "cabinet-b": "front of B", "cabinet-c": "front of C"}
 #: For so long nothing is carried about, so that what the story ended with can be looked at.
-_AS_THE_STORY_LEFT_IT_S = 300.0
+_AS_THE_STORY_LEFT_IT_S = 600.0
 _STROLL = ("middle", "north", "bed", "east", "south")
 
 
