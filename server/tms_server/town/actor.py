@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from bisect import bisect_right, insort
 from collections.abc import AsyncIterator
 from datetime import datetime, timedelta
-from operator import attrgetter
+from heapq import heappop, heappush
 from typing import NamedTuple
 
 from tms_server.clock import Clock
@@ -27,8 +26,6 @@ _log = logging.getLogger(__name__)
 #: Seconds that a query waits for the fold to catch up before it is told to come back.
 _PATIENCE_S = 30.0
 _LAST_SEQ = 2**63 - 1
-_position = attrgetter("observed_at", "agent", "seq")
-_observed_at = attrgetter("observed_at")
 
 
 class Frozen(NamedTuple):
@@ -51,7 +48,8 @@ class RoomActor:
         self._fold = RoomFold(self._budget)
         self._past = Checkpoints(self._fold)
         #: Taken in but not folded, in fold order.
-        self._held: list[Record] = []
+        #: Records that wait for the hold-back, a heap.
+        self._held: list[tuple[Position, Record]] = []
         self._folding = asyncio.Lock()
         self._news = asyncio.Event()
         self._since_snapshot = 0
@@ -119,10 +117,10 @@ class RoomActor:
             past = Checkpoints(fold)
             self._since_snapshot = 0
             horizon = self._horizon()
-            held: list[Record] = []
+            held: list[tuple[Position, Record]] = []
             async for page in self._log.replay(self.room, after=fold.position, until=None, head=head):
                 due = [record for record in page if record.observed_at <= horizon]
-                held.extend(page[len(due) :])
+                held.extend((record.position, record) for record in page[len(due) :])  # in order: a heap
                 await asyncio.to_thread(_fold_all, fold, past, due)
                 self._since_snapshot += len(due)
             self._fold, self._past, self._held, self.head = fold, past, held, head
@@ -146,16 +144,17 @@ class RoomActor:
             following.cancel()
 
     async def _take(self, page: list[Record]) -> None:
+        held, horizon = self._held, self._horizon()
         for record in page:
             if not record.late:
-                insort(self._held, record, key=_position)
-        ready = bisect_right(self._held, self._horizon(), key=_observed_at)
-        due = self._held[:ready]
+                heappush(held, (record.position, record))
+        due: list[Record] = []
+        while held and held[0][0].observed_at <= horizon:
+            due.append(heappop(held)[1])
         head = page[-1].offset if page else self.head
         if not due and head == self.head:
             return
         async with self._folding:
-            del self._held[:ready]
             if due:
                 await self._fold_in(due, head)
             self.head = head
@@ -173,7 +172,7 @@ class RoomActor:
         rewound = self._past.rewind(first)
         if rewound is not None:
             self._fold, again = rewound
-            merged = sorted([*again, *due], key=_position)
+            merged = sorted([*again, *due], key=lambda record: record.position)
             await asyncio.to_thread(_fold_all, self._fold, self._past, merged)
             return
         # Before everything in memory: from a stored state, or from the beginning. The log holds the new records too.
