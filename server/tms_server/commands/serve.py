@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from tms_client.cli import ArgumentParser, CommandError
 from tms_server.compiled import use_compiled_cache
 from tms_server.settings import Settings
@@ -19,8 +21,10 @@ def main(argv: Sequence[str]) -> int:
     given = {name: value for name, value in vars(parser.parse_args(argv)).items() if value is not None}
     try:
         settings = Settings(**given)
-    except ValueError as error:
-        raise CommandError(f"settings: {error}") from error
+    except ValidationError as error:
+        wrong = error.errors()[0]
+        name = ".".join(str(part) for part in wrong["loc"])
+        raise CommandError(f"{name} (TMS_{name.upper()}): {wrong['msg']}, got {wrong['input']!r}") from error
     settings.data_dir.mkdir(parents=True, exist_ok=True)
     use_compiled_cache(settings.data_dir)
     from tms_server.commands.serving import serve  # numba reads its cache directory on import
