@@ -84,6 +84,8 @@ class HandConfig(AgentConfig):
     visits: VisitSection = VisitSection()
     #: The device is called silent when nothing valid came for this long.
     silent_after_s: Seconds = 10.0
+    #: The state of the device is posted again this often, so that a quiet agent is not taken for a dead one.
+    heartbeat_s: Annotated[float, Field(gt=0, le=3600)] = 10.0
 
     @property
     def counts_visits(self) -> bool:

@@ -16,7 +16,7 @@ from tms_agents.devices.transport import DeviceState
 from tms_agents.hand.config import CaptureSource, HandConfig
 from tms_agents.hand.sources import Seen, arrivals
 from tms_agents.hand.visits import Visits
-from tms_client import AsyncTown, Pace, Spool, SpoolFull
+from tms_client import AsyncPoster, AsyncTown, Pace, Spool, SpoolFull
 from tms_schemas.observation import AgentState, Observation, RawRead
 
 log = logging.getLogger(__name__)
@@ -67,10 +67,11 @@ async def run(
             AsyncTown(config.server.url, config.server.key) as town,
             town.poster(spool, config.room, pace=pace) as poster,
         ):
-            at = None
+            at, heart = None, _Heart(config, poster, clock)
             with contextlib.suppress(asyncio.CancelledError):
-                async with contextlib.aclosing(arrivals(config, clock)) as items:
+                async with contextlib.aclosing(arrivals(config, clock)) as items, heart:
                     async for at, item in items:
+                        heart.device = item if isinstance(item, DeviceState) else heart.device
                         observations = _observations(config, visits, tally, at, item)
                         try:
                             if observations:
@@ -93,6 +94,29 @@ async def run(
             tally.trouble = str(poster.trouble or "")
         tally.buried, tally.waiting = spool.buried - buried_before, len(spool)
     return tally
+
+
+class _Heart:
+    """Posts the device's state again and again while it is entered; a recording has none."""
+
+    def __init__(self, config: HandConfig, poster: AsyncPoster, clock: Callable[[], float]) -> None:
+        self.device: DeviceState | None = None
+        self._config, self._poster, self._clock = config, poster, clock
+
+    async def __aenter__(self) -> None:
+        self._beating = asyncio.create_task(self._beat())
+
+    async def __aexit__(self, *_: object) -> None:
+        self._beating.cancel()
+        await asyncio.gather(self._beating, return_exceptions=True)
+
+    async def _beat(self) -> None:
+        while not isinstance(self._config.source, CaptureSource):
+            await asyncio.sleep(self._config.heartbeat_s)
+            if self.device is not None:
+                now, device = datetime.fromtimestamp(self._clock(), UTC), self.device
+                with contextlib.suppress(SpoolFull):
+                    await self._poster.post(AgentState(seq=0, observed_at=now, state=device.state, why=device.why))
 
 
 def _observations(

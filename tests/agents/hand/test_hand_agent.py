@@ -189,6 +189,25 @@ async def test_a_live_reader_until_a_signal(town, room, configure, number):
     assert town.agents.get(f"{room}-hand").missing == 0
 
 
+async def test_a_quiet_agent_says_that_it_lives(town, room, configure):
+    """A reader without tags in view: the agent repeats its state instead of falling silent."""
+    async with LlrpEmulator(period_s=0.02) as reader:
+        source = {"kind": "llrp", "host": "127.0.0.1", "port": reader.port, "keepalive_s": 0.2}
+        config = configure(source, heartbeat_s=0.2)
+        agent = subprocess.Popen(
+            [sys.executable, "-m", "tms_client", "agent", "hand", "--config", str(config)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            await _until(lambda: town.agents.get(f"{room}-hand").next_seq >= 5)
+            assert town.agents.get(f"{room}-hand").state == "connected"
+        finally:
+            agent.terminate()
+            await asyncio.to_thread(agent.wait, 10)
+    assert counts(town, room) == {}
+
+
 async def test_a_reader_that_fails_is_shown_faulty_within_seconds(town, room, configure):
     device = Tr3Device()
     device.see(UID)
