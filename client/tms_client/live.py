@@ -1,8 +1,7 @@
 """``WS /v1/live``: typed frames of one room, going on after a cut exactly where it was.
 
 Event frames are numbered by the room log, so a reconnect that names the last one seen continues without a gap and
-without repetition. State frames are latest-wins. A snapshot after a reconnect says that the server no longer holds
-the events in between.
+without repetition; then a snapshot is the new base of the states. State frames are latest-wins.
 """
 
 from __future__ import annotations

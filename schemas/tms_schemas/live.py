@@ -1,7 +1,7 @@
 """Frames of ``WS /v1/live``.
 
-The client connects with query parameters or sends one ``Subscribe`` message. The first frame is a ``SnapshotFrame``
-(or, when resuming with a cursor that the log still holds, the events since then). Every frame carries ``cursor``,
+The client connects with query parameters or sends one ``Subscribe`` message. The first frame is a ``SnapshotFrame``;
+when resuming with a cursor that the log holds, the events since then come before it. Every frame carries ``cursor``,
 the room log offset: *event* frames are lossless by cursor across reconnects, *state* frames are latest-wins.
 """
 
