@@ -7,10 +7,11 @@ import json
 import sqlite3
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 
 from tms_server.log import store
 from tms_server.log.plan import AgentFacts, Known, Plan
-from tms_server.log.record import Batch
+from tms_server.log.record import Batch, Record
 
 #: Seconds that an append waits for the write lock of another connection.
 _PATIENCE_S = 10.0
@@ -85,7 +86,7 @@ def _read(connection: sqlite3.Connection, batches: Sequence[Batch], newest: bool
 
 def _write(connection: sqlite3.Connection, plan: Plan) -> None:
     many = connection.executemany
-    many(f"insert into log ({store.LOG_COLUMNS}) values (?, ?, ?, ?, ?, ?, ?, ?, ?)", plan.records)
+    _insert(connection, plan.records)
     many("update rooms set head = ? where room = ?", [(head, room) for room, head in plan.heads.items()])
     many(
         f"insert into agents ({store.AGENT_COLUMNS}) values (?, ?, ?, ?, ?, ?, ?, ?, ?) {store.ON_AGENT_CONFLICT}",
@@ -96,6 +97,20 @@ def _write(connection: sqlite3.Connection, plan: Plan) -> None:
         + store.ON_UNKNOWN_CONFLICT,
         list(plan.unknown.values()),
     )
+
+
+def _insert(connection: sqlite3.Connection, records: Sequence[Record]) -> None:
+    """Many rows per statement: the driver gives the interpreter's lock away and fetches it back once for each step.
+
+    With one row per step every row would wait for whatever the event loop is doing.
+    """
+    at = 0
+    for size in (64, 16, 4, 1):
+        row = "(" + ", ".join("?" * len(Record._fields)) + ")"
+        statement = f"insert into log ({store.LOG_COLUMNS}) values {', '.join([row] * size)}"
+        while len(records) - at >= size:
+            connection.execute(statement, list(chain.from_iterable(records[at : at + size])))
+            at += size
 
 
 def _list(values: Sequence[object]) -> str:
