@@ -6,6 +6,7 @@ into rows and verdicts (``Plan``), and the store writes the rows. A refused batc
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -68,9 +69,13 @@ class Plan:
 def decide(batches: Sequence[Batch], known: Known, *, now: int, retention_us: int | None) -> Plan:
     """Rows to write and a verdict per batch. ``now`` is the time of receipt, microseconds UTC."""
     plan = Plan([])
+    counts = Counter(batch.agent for batch in batches)
     for batch in batches:
         try:
-            plan.verdicts.append(_append(batch, known, plan, now, retention_us))
+            appended = _append(batch, known, plan, now, retention_us)
+            if counts[batch.agent] > 1:  # its next batch may repeat what this one says
+                known.stored.update({(batch.agent, item.seq): (batch.room, item.body) for item in batch.items})
+            plan.verdicts.append(appended)
         except TmsError as refusal:
             plan.verdicts.append(refusal)
     # Every batch of a room is answered with the room's newest offset, which they all reached together.
@@ -95,7 +100,6 @@ def _append(batch: Batch, known: Known, plan: Plan, now: int, retention_us: int 
             too_late.append(item.seq)
         record = Record(room, offset, agent, item.seq, item.observed_at, now, item.kind, item.body, late)
         plan.records.append(record)
-        known.stored[agent, item.seq] = (room, item.body)
         for read in item.reads:
             if (room, read.tag) not in known.registered:
                 _count_unknown(plan, agent, room, item, read)
