@@ -20,3 +20,17 @@ class TagRead:
     first_seen: datetime | None = None
     last_seen: datetime | None = None
     count: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class RoundEnd:
+    """An antenna has been asked for all its tags: what was not read since its last round is not in its field.
+
+    Delivered behind the reads of the round, and only for rounds that ran to their end: a round cut short by a fault, a
+    lost reply or a field that is off is no statement about absence.
+    """
+
+    antenna: int
+
+
+TagItem = TagRead | RoundEnd

@@ -10,11 +10,12 @@ import time
 
 import pytest
 
+from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.llrp.emulator import LlrpEmulator
 from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.tags import TagRead
 from tms_agents.devices.tr3.codec import Frame
-from tms_agents.devices.tr3.emulator import PtyLine, TcpLine, Tr3Device
+from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_agents.devices.tr3.session import Tr3Session
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
 from tms_client import Retry

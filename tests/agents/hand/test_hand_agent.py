@@ -14,12 +14,13 @@ from pathlib import Path
 import pytest
 
 from tms_agents.config import read_config
+from tms_agents.devices.emulation import PtyLine
 from tms_agents.devices.llrp import messages
 from tms_agents.devices.llrp.codec import Parameter, encode
 from tms_agents.devices.llrp.emulator import LlrpEmulator
 from tms_agents.devices.tags import TagRead
 from tms_agents.devices.tr3.codec import Frame
-from tms_agents.devices.tr3.emulator import PtyLine, Tr3Device
+from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_agents.hand.config import HandConfig
 from tms_client import Spool, cli
 

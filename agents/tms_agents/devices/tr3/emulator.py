@@ -1,12 +1,8 @@
-"""A TR3 for tests and demos: behind a pseudo terminal or a TCP port, byte for byte."""
+"""A TR3 for tests and demos, byte for byte; ``devices.emulation`` puts it behind a terminal or a TCP port."""
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import os
-import pty
-import tty
 
 from tms_agents.devices.tr3.codec import ACK, INVENTORY, MODE, NACK, READ, UID, Frame, FrameParser
 
@@ -68,71 +64,3 @@ class Tr3Device:
                 Frame(UID, b"\x00" + bytes.fromhex(uid)[::-1]) for uid in new
             ]
         return [Frame(NACK, b"\x44")]
-
-
-class PtyLine:
-    """Puts a device behind a pseudo terminal; ``path`` is what the driver opens."""
-
-    def __init__(self, device: Tr3Device) -> None:
-        self.device = device
-        self.path = ""
-
-    def inject(self, data: bytes) -> None:
-        """Send bytes as they are: garbage, half a frame, RDLOOP frames."""
-        os.write(self._master, data)
-
-    async def __aenter__(self) -> PtyLine:
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
-        asyncio.get_running_loop().add_reader(self._master, self._serve)
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        asyncio.get_running_loop().remove_reader(self._master)
-        os.close(self._slave)
-        os.close(self._master)
-
-    def _serve(self) -> None:
-        with contextlib.suppress(BlockingIOError):
-            if answer := self.device.receive(os.read(self._master, 4096)):
-                os.write(self._master, answer)
-
-
-class TcpLine:
-    """Puts a device behind a TCP port, as the LAN models are."""
-
-    def __init__(self, device: Tr3Device, host: str = "127.0.0.1", port: int = 0) -> None:
-        self.device, self.host, self.port = device, host, port
-        self._writers: set[asyncio.StreamWriter] = set()
-        self._idle = asyncio.Event()
-        self._idle.set()
-
-    def hang_up(self) -> None:
-        """Cut all connections as a pulled cable does."""
-        for writer in self._writers:
-            writer.transport.abort()
-
-    async def __aenter__(self) -> TcpLine:
-        self._server = await asyncio.start_server(self._serve, self.host, self.port)
-        self.port = self._server.sockets[0].getsockname()[1]
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self._server.close()
-        self.hang_up()
-        await self._idle.wait()
-
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._writers.add(writer)
-        self._idle.clear()
-        try:
-            with contextlib.suppress(ConnectionError):
-                while data := await reader.read(4096):
-                    writer.write(self.device.receive(data))
-        finally:
-            self._writers.discard(writer)
-            writer.close()
-            if not self._writers:
-                self._idle.set()
