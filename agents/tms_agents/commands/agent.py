@@ -2,57 +2,66 @@
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import logging
-import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
-from tms_agents.config import read_config
-from tms_agents.hand.config import CaptureSource, HandConfig
-from tms_agents.hand.runner import Tally, run
+from tms_agents.config import AgentConfig, read_config
+from tms_agents.hand.config import HandConfig
+from tms_agents.hand.runner import Tally
+from tms_agents.hand.runner import run as run_hand
+from tms_agents.readers import CaptureSource
+from tms_agents.running import Posted, until_signalled
 from tms_client.cli import ArgumentParser, CommandError
 from tms_client.errors import SpoolError
 
 _STOP_S = 2.0  # for what still waits when the agent is asked to stop; the rest stays in the spool
+P = TypeVar("P", bound=Posted)
 
 
 def main(argv: Sequence[str]) -> int:
     parser = ArgumentParser(prog="tms agent", description="Run one agent beside its sensor.")
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
-    hand = kinds.add_parser("hand", help="tag reader of a robot's hand: LLRP, Takaya TR3, or a recording")
-    hand.add_argument("--config", type=Path, required=True, metavar="FILE", help="TOML file")
+    hand = _kind(kinds, "hand", "tag reader of a robot's hand: LLRP, Takaya TR3, or a recording", _hand)
     hand.add_argument("--once", action="store_true", help="with a capture: end when all of it has reached the server")
     hand.add_argument(
         "--timeout", type=float, default=60.0, metavar="S", help="with --once: wait this long for the server"
     )
     arguments = parser.parse_args(argv)
+    done: int = arguments.work(arguments)
+    return done
+
+
+def _kind(kinds: Any, name: str, text: str, work: Callable[[argparse.Namespace], int]) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = kinds.add_parser(name, help=text)
+    parser.add_argument("--config", type=Path, required=True, metavar="FILE", help="TOML file")
+    parser.set_defaults(work=work)
+    return parser
+
+
+def _hand(arguments: argparse.Namespace) -> int:
     config = read_config(arguments.config, HandConfig)
     if arguments.once and not isinstance(config.source, CaptureSource):
         raise CommandError("--once needs a source of kind capture: a reader has no end")
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
-    logging.getLogger("httpx").setLevel(logging.WARNING)
-    try:
-        tally = asyncio.run(_until_signalled(config, arguments.once, arguments.timeout))
-    except SpoolError as error:
-        raise CommandError(str(error)) from error
-    _say(config, tally)
+    drain_s = arguments.timeout if arguments.once else _STOP_S
+    tally = _run(config, run_hand(config, once=arguments.once, drain_s=drain_s, progress=_progress()))
     return 1 if arguments.once and (tally.waiting or tally.buried or tally.lost) else 0
 
 
-async def _until_signalled(config: HandConfig, once: bool, timeout_s: float) -> Tally:
-    """Run; SIGINT and SIGTERM end it as the end of the source does: the spool is closed in order."""
-    drain_s = timeout_s if once else _STOP_S
-    task = asyncio.ensure_future(run(config, once=once, drain_s=drain_s, progress=_progress()))
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, task.cancel)
+def _run(config: AgentConfig, work: Coroutine[Any, Any, P]) -> P:
+    """Log to stderr, work until a signal, say at the end what was done."""
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
+    logging.getLogger("httpx").setLevel(logging.WARNING)
     try:
-        return await task
-    finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(number)
+        posted = asyncio.run(until_signalled(work))
+    except SpoolError as error:
+        raise CommandError(str(error)) from error
+    sys.stdout.write(f"{config.agent}: {posted.in_words()}\n")
+    return posted
 
 
 def _progress() -> Callable[[Tally], None]:
@@ -60,11 +69,3 @@ def _progress() -> Callable[[Tally], None]:
         sys.stderr.write(f"\r{tally.reports} reports of {len(tally.tags)} tags, {tally.observations} observations ")
 
     return show if sys.stderr.isatty() else lambda tally: None
-
-
-def _say(config: HandConfig, tally: Tally) -> None:
-    sys.stdout.write(
-        f"{config.agent}: {tally.reports} reports of {len(tally.tags)} tags, {tally.observations} observations, "
-        f"{tally.buried} refused by the server, {tally.lost} lost, {tally.waiting} waiting in the spool"
-        f"{f' ({tally.trouble})' if tally.trouble else ''}\n"
-    )

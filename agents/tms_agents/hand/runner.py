@@ -8,36 +8,30 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 
 from pydantic import ValidationError
 
+from tms_agents.devices.tags import RoundEnd
 from tms_agents.devices.transport import DeviceState
-from tms_agents.hand.config import CaptureSource, HandConfig
-from tms_agents.hand.sources import Seen, arrivals
+from tms_agents.hand.config import HandConfig
 from tms_agents.hand.visits import Visits
-from tms_client import AsyncPoster, AsyncTown, Pace, Spool, SpoolFull
-from tms_schemas.observation import AgentState, Observation, RawRead
+from tms_agents.readers import CaptureSource, Seen, open_reader
+from tms_agents.running import Posted, running
+from tms_schemas.observation import RawRead
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
-class Tally:
-    """What a run did.
-
-    ``lost`` observations found the spool full; ``unusable`` tags have ids that the wire cannot carry (longer than 64
-    hex digits).
-    """
+class Tally(Posted):
+    """What a run did. ``unusable`` tags have ids that the wire cannot carry (longer than 64 hex digits)."""
 
     reports: int = 0
     tags: set[str] = field(default_factory=set)
-    observations: int = 0
-    lost: int = 0
     unusable: set[str] = field(default_factory=set)
-    buried: int = 0
-    waiting: int = 0
-    trouble: str = ""
+
+    def in_words(self) -> str:
+        return f"{self.reports} reports of {len(self.tags)} tags, {Posted.in_words(self)}"
 
 
 async def run(
@@ -56,77 +50,28 @@ async def run(
         SpoolError: the spool cannot be opened.
         CommandError: a capture cannot be read.
     """
-    tally = Tally()
-    visits = Visits(config.visits.gap_s)
-    pace = Pace(batch=config.server.batch, linger_s=config.server.linger_s)
-    with Spool(
-        config.spool.path, config.agent, max_items=config.spool.max_items, max_bytes=config.spool.max_bytes
-    ) as spool:
-        buried_before = spool.buried
-        async with (
-            AsyncTown(config.server.url, config.server.key) as town,
-            town.poster(spool, config.room, pace=pace) as poster,
-        ):
-            at, heart = None, _Heart(config, poster, clock)
-            with contextlib.suppress(asyncio.CancelledError):
-                async with contextlib.aclosing(arrivals(config, clock)) as items, heart:
-                    async for at, item in items:
-                        heart.device = item if isinstance(item, DeviceState) else heart.device
-                        observations = _observations(config, visits, tally, at, item)
-                        try:
-                            if observations:
-                                await poster.post(*observations)
-                        except SpoolFull as full:
-                            if not tally.lost:
-                                log.error("%s; what is seen now is lost", full)
-                            tally.lost += len(observations)
-                        else:
-                            tally.observations += len(observations)
-                        progress(tally)
-                if not once:
-                    await asyncio.Event().wait()
-            with contextlib.suppress(SpoolFull):
-                recorded = at if isinstance(config.source, CaptureSource) else None
-                ended = recorded or datetime.fromtimestamp(clock(), UTC)
-                await poster.post(AgentState(seq=0, observed_at=ended, state="silent", why="the agent ended"))
-            with contextlib.suppress(asyncio.CancelledError):
-                await poster.drain(drain_s)
-            tally.trouble = str(poster.trouble or "")
-        tally.buried, tally.waiting = spool.buried - buried_before, len(spool)
+    tally, visits = Tally(), Visits(config.visits.gap_s)
+    heartbeat_s = None if isinstance(config.source, CaptureSource) else config.heartbeat_s
+    arrivals = open_reader(config.source, silent_after_s=config.silent_after_s, clock=clock)
+    async with running(config, drain_s=drain_s, heartbeat_s=heartbeat_s, posted=tally, clock=clock) as agent:
+        async with contextlib.aclosing(arrivals):
+            async for at, item in arrivals:
+                if isinstance(item, DeviceState):
+                    await agent.device("reader", at, item)
+                else:
+                    await agent.observations(*raw_reads(config, visits, tally, item))
+                progress(tally)
+        if not once:
+            await asyncio.Event().wait()
     return tally
 
 
-class _Heart:
-    """Posts the device's state again and again while it is entered; a recording has none."""
-
-    def __init__(self, config: HandConfig, poster: AsyncPoster, clock: Callable[[], float]) -> None:
-        self.device: DeviceState | None = None
-        self._config, self._poster, self._clock = config, poster, clock
-
-    async def __aenter__(self) -> None:
-        self._beating = asyncio.create_task(self._beat())
-
-    async def __aexit__(self, *_: object) -> None:
-        self._beating.cancel()
-        await asyncio.gather(self._beating, return_exceptions=True)
-
-    async def _beat(self) -> None:
-        while not isinstance(self._config.source, CaptureSource):
-            await asyncio.sleep(self._config.heartbeat_s)
-            if self.device is not None:
-                now, device = datetime.fromtimestamp(self._clock(), UTC), self.device
-                with contextlib.suppress(SpoolFull):
-                    await self._poster.post(AgentState(seq=0, observed_at=now, state=device.state, why=device.why))
-
-
-def _observations(
-    config: HandConfig, visits: Visits, tally: Tally, at: datetime, item: Sequence[Seen] | DeviceState
-) -> list[Observation]:
-    if isinstance(item, DeviceState):
-        log.info("%s: %s", item.state, item.why)
-        return [AgentState(seq=0, observed_at=at, state=item.state, why=item.why)]
-    observations: list[Observation] = []
-    for seen in item:
+def raw_reads(config: HandConfig, visits: Visits, tally: Tally, items: Sequence[Seen | RoundEnd]) -> list[RawRead]:
+    """What is posted of a group of reports: each, or each that begins a visit."""
+    observations: list[RawRead] = []
+    for seen in items:
+        if isinstance(seen, RoundEnd):
+            continue
         tag, zone = seen.read.tag, config.zone_of(seen.read.antenna)
         tally.reports += 1
         begins = visits.see(zone, tag, seen.first, seen.last)

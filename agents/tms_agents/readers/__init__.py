@@ -1,0 +1,23 @@
+"""Tag readers as agents use them: sections of the configuration, and one way to open any of them."""
+
+from tms_agents.readers.config import (
+    CaptureSource,
+    LlrpSource,
+    Port,
+    ReaderSource,
+    Tr3SerialSource,
+    Tr3TcpSource,
+)
+from tms_agents.readers.opening import Arrival, Seen, open_reader
+
+__all__ = [
+    "Arrival",
+    "CaptureSource",
+    "LlrpSource",
+    "Port",
+    "ReaderSource",
+    "Seen",
+    "Tr3SerialSource",
+    "Tr3TcpSource",
+    "open_reader",
+]

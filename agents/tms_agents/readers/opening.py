@@ -1,0 +1,79 @@
+"""Open any tag reader: what it reads and how it is, with the time of each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncGenerator, Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from tms_agents.devices.llrp.session import LlrpSession
+from tms_agents.devices.tags import RoundEnd, TagItem, TagRead
+from tms_agents.devices.tr3.session import Tr3Session
+from tms_agents.devices.transport import DeviceState, Link, serial, tcp
+from tms_agents.readers.capture import groups
+from tms_agents.readers.config import CaptureSource, LlrpSource, ReaderSource, Tr3SerialSource, Tr3TcpSource
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A report with the times to use for it (UTC)."""
+
+    read: TagRead
+    first: datetime
+    last: datetime
+
+
+#: Time of arrival (UTC), and what arrived: reads and ends of rounds in their order, or a new state of the device.
+Arrival = tuple[datetime, Sequence[Seen | RoundEnd] | DeviceState]
+
+
+async def open_reader(
+    source: ReaderSource, *, silent_after_s: float = 10.0, clock: Callable[[], float] = time.time
+) -> AsyncGenerator[Arrival, None]:
+    """Listen to a reader for ever, through every failure of it; a capture ends, and has the times of its recording.
+
+    ``clock`` gives Unix time.
+
+    Raises:
+        CommandError: a capture cannot be read.
+    """
+    if isinstance(source, CaptureSource):
+        for at, found in groups(source):
+            yield at, found if isinstance(found, DeviceState) else [_seen(read, at, own_clock=True) for read in found]
+        return
+    own_clock = isinstance(source, LlrpSource) and source.reader_clock
+    async for item in _link(source, silent_after_s).listen():
+        at = datetime.fromtimestamp(clock(), UTC)
+        if isinstance(item, DeviceState):
+            yield at, item
+        else:
+            yield at, [one if isinstance(one, RoundEnd) else _seen(one, at, own_clock) for one in item]
+
+
+def _link(source: LlrpSource | Tr3SerialSource | Tr3TcpSource, silent_after_s: float) -> Link[TagItem]:
+    if isinstance(source, LlrpSource):
+        return Link(
+            tcp(source.host, source.port),
+            lambda: LlrpSession(antennas=source.antennas, keepalive_s=source.keepalive_s),
+            name=f"LLRP reader {source.host}:{source.port}",
+            silent_after_s=max(silent_after_s, 2.5 * source.keepalive_s),
+        )
+    if isinstance(source, Tr3SerialSource):
+        opener, name = serial(source.device, source.baud), f"TR3 {source.device}"
+    else:
+        opener, name = tcp(source.host, source.port), f"TR3 {source.host}:{source.port}"
+    return Link(
+        opener,
+        lambda: Tr3Session(antennas=source.antennas, mode=source.mode, poll_s=source.poll_s),
+        name=name,
+        silent_after_s=silent_after_s,
+        tick_s=min(0.05, source.poll_s / 2),
+    )
+
+
+def _seen(read: TagRead, at: datetime, own_clock: bool) -> Seen:
+    first = read.first_seen or read.last_seen
+    if own_clock and first is not None:
+        return Seen(read, first, max(read.last_seen or first, first))
+    return Seen(read, at, at)
