@@ -47,7 +47,7 @@ def registry(sessions: Sessions) -> Callable[[str], Awaitable[list[dict[str, Any
 
     async def read(room: str) -> list[dict[str, Any]]:
         async with sessions.read() as session:
-            query = select(LogRow).where(LogRow.room == room, LogRow.kind == "registry").order_by(LogRow.offset)
+            query = select(LogRow).where(LogRow.room == room, LogRow.agent == f"@{room}").order_by(LogRow.offset)
             return [json.loads(row.body) for row in (await session.scalars(query)).all()]
 
     return read

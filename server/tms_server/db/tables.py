@@ -80,7 +80,7 @@ class RoomRow(Base):
 
 
 class LogRow(Base):
-    """The room log: the truth from which every belief is folded.
+    """The room log: the truth from which every belief is folded. A row is a block of records (log/blocks.py).
 
     Observations carry the agent's (agent, seq); registry records (object registered, room changed ...) the agent
     ``@<room>``, a name that no agent can have, and the room's own running number.
@@ -88,21 +88,25 @@ class LogRow(Base):
 
     __tablename__ = "log"
     __table_args__ = (
-        Index("ix_log_position", "room", "observed_at", "agent", "seq"),
+        Index("ix_log_position", "room", "first_at", "agent", "seq"),
         UniqueConstraint("agent", "seq", name="uq_log_agent"),
-        {"sqlite_with_rowid": False},  # one tree less to write per record
     )
 
     room: Mapped[str] = mapped_column(primary_key=True)
+    #: Of the block's last record.
     offset: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     agent: Mapped[str]
+    #: Of the block's first record.
     seq: Mapped[int]
-    observed_at: Mapped[int]
+    #: How many: their offsets and seqs run on without gaps.
+    records: Mapped[int]
+    #: Smallest and largest observed_at.
+    first_at: Mapped[int]
+    last_at: Mapped[int]
     received_at: Mapped[int]
-    kind: Mapped[str]
-    body: Mapped[str]
     #: Arrived after the retention window: kept, but no belief knows it.
     late: Mapped[bool]
+    body: Mapped[str]
 
 
 class AgentRow(Base):

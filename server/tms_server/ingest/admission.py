@@ -21,7 +21,7 @@ from tms_schemas.problem import ProblemItem
 from tms_server import problems
 from tms_server.db.times import to_us
 from tms_server.errors import Invalid, TmsError
-from tms_server.log.record import Batch, Item, TagRead
+from tms_server.log.record import Batch, TagRead
 
 #: Problems reported of one batch.
 _MOST_PROBLEMS = 100
@@ -41,37 +41,33 @@ def admit(body: bytes) -> Batch:
     foreign = _foreign_labels(batch)
     if foreign:
         raise Invalid(f"{foreign[0].where}: {foreign[0].why}", items=foreign[:_MOST_PROBLEMS])
-    return Batch(batch.agent, batch.room, [_item(observation) for observation in batch.observations])
-
-
-def _item(observation: Observation) -> Item:
-    # What was sent, no more: a tag that is null and a tag that is absent are different observations.
-    body = observation.__pydantic_serializer__.to_json(observation, exclude_unset=True, by_alias=True).decode()
-    return Item(
-        observation.seq,
-        to_us(observation.observed_at),
-        observation.type,
-        body,
-        _tag_reads(observation),
-        (observation.state, observation.why.replace("\0", "")) if observation.type == "agent_state" else None,
+    observations = batch.observations
+    reads = [read for o in observations if o.type in _READS for read in _tag_reads(o)]
+    return Batch(
+        batch.agent,
+        batch.room,
+        observations,
+        [observation.seq for observation in observations],
+        [to_us(observation.observed_at) for observation in observations],
+        reads,
+        body.decode(),
     )
 
 
-def _tag_reads(observation: Observation) -> tuple[TagRead, ...]:
+def _tag_reads(observation: Observation) -> list[TagRead]:
     """The tags it read, each once."""
-    if observation.type not in _READS:
-        return ()
+    seq, at = observation.seq, to_us(observation.observed_at)
     match observation:
         case LabelAppeared(tag=str(tag), label=label, xy=(x, y)):
-            return (TagRead(tag, label, x, y),)
+            return [TagRead(seq, at, tag, label, x, y)]
         case TagObserved(tag=tag, label=label):
-            return (TagRead(tag, label, None, None),)
+            return [TagRead(seq, at, tag, label, None, None)]
         case RawRead(tag=str(tag)) | Handover(tag=str(tag)):
-            return (TagRead(tag, None, None, None),)
+            return [TagRead(seq, at, tag, None, None, None)]
         case Inventory(labels=labels):
-            reads = [TagRead(i.tag, i.label, i.xy[0], i.xy[1]) for i in labels if i.tag is not None]
-            return tuple({read.tag: read for read in reads}.values())
-    return ()
+            reads = [TagRead(seq, at, i.tag, i.label, i.xy[0], i.xy[1]) for i in labels if i.tag is not None]
+            return list({read.tag: read for read in reads}.values())
+    return []
 
 
 #: Types that may read a tag; asking for the class of every observation would cost more than all the rest.

@@ -90,7 +90,7 @@ class GroupWriter:
                 waiting.verdict.set_exception(verdict)
 
     def _admit(self, batch: Batch) -> None:
-        count, limits = len(batch.items), self._settings
+        count, limits = len(batch.observations), self._settings
         if self._closing:
             raise Unavailable("the server is shutting down", retry_after_s=5)
         if self._held[batch.agent] and self._held[batch.agent] + count > limits.queue_per_agent:
@@ -105,13 +105,13 @@ class GroupWriter:
     def _next_group(self) -> list[_Waiting]:
         group: list[_Waiting] = []
         room_left = _GROUP
-        while self._queue and (not group or len(self._queue[0].batch.items) <= room_left):
+        while self._queue and (not group or len(self._queue[0].batch.observations) <= room_left):
             group.append(self._queue.popleft())
-            room_left -= len(group[-1].batch.items)
+            room_left -= len(group[-1].batch.observations)
         return group
 
     def _hold(self, batch: Batch, sign: int) -> None:
-        self._total += sign * len(batch.items)
-        self._held[batch.agent] += sign * len(batch.items)
+        self._total += sign * len(batch.observations)
+        self._held[batch.agent] += sign * len(batch.observations)
         if not self._held[batch.agent]:
             del self._held[batch.agent]

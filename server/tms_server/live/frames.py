@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 from tms_schemas.live import ErrorFrame, EventFrame
 from tms_server.db.times import from_us
 from tms_server.errors import TmsError
@@ -15,8 +13,7 @@ GOING_AWAY, TRY_AGAIN_LATER = 1001, 1013
 
 def event_frame(record: Record) -> str:
     """A log record as an event frame; ``event`` is the observation without its envelope, with its ``type``."""
-    body = json.loads(record.body)
-    event = {name: value for name, value in body.items() if name not in ("seq", "observed_at")}
+    event = record.content.model_dump(mode="json", exclude={"seq", "observed_at"}, exclude_unset=True, by_alias=True)
     return EventFrame(
         room=record.room,
         cursor=record.offset,

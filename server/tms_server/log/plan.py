@@ -11,9 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from tms_schemas.observation import AgentState, Observation
 from tms_schemas.problem import ProblemItem
 from tms_server.errors import Conflict, NotFound, TmsError
-from tms_server.log.record import Appended, Batch, Item, Record, TagRead, Verdict
+from tms_server.log.blocks import Written, cut
+from tms_server.log.bodies import Content
+from tms_server.log.record import Appended, Batch, TagRead, Verdict
 
 
 class AgentFacts(NamedTuple):
@@ -51,8 +54,8 @@ class Known:
     heads: dict[str, int]
     newest: dict[str, int]
     agents: dict[str, AgentFacts]
-    #: (room, body) of recorded observations that the batches name again
-    stored: dict[tuple[str, int], tuple[str, str]]
+    #: (agent, seq) -> room and content of recorded observations that the batches name again
+    stored: dict[tuple[str, int], tuple[str, Content]]
     #: (room, tag) of the tags read that are registered there
     registered: set[tuple[str, str]]
 
@@ -60,7 +63,7 @@ class Known:
 @dataclass(slots=True)
 class Plan:
     verdicts: list[Verdict]
-    records: list[Record] = field(default_factory=list)
+    blocks: list[Written] = field(default_factory=list)
     heads: dict[str, int] = field(default_factory=dict)
     agents: dict[str, AgentFacts] = field(default_factory=dict)
     unknown: dict[tuple[str, str], UnknownRead] = field(default_factory=dict)
@@ -74,7 +77,7 @@ def decide(batches: Sequence[Batch], known: Known, *, now: int, retention_us: in
         try:
             appended = _append(batch, known, plan, now, retention_us)
             if counts[batch.agent] > 1:  # its next batch may repeat what this one says
-                known.stored.update({(batch.agent, item.seq): (batch.room, item.body) for item in batch.items})
+                known.stored |= {(batch.agent, o.seq): (batch.room, o) for o in batch.observations}
             plan.verdicts.append(appended)
         except TmsError as refusal:
             plan.verdicts.append(refusal)
@@ -90,46 +93,50 @@ def _append(batch: Batch, known: Known, plan: Plan, now: int, retention_us: int 
     room, agent = batch.room, batch.agent
     if room not in known.heads:
         raise NotFound(f"there is no room {room!r}", items=[ProblemItem(where="room", why="unknown room")])
-    new = _new_items(batch, known)
-    head = known.heads[room]
-    horizon = _horizon(known, room, now, retention_us)
+    new = _new(batch, known)
     too_late: list[int] = []
-    for offset, item in enumerate(new, head + 1):
-        late = horizon is not None and item.observed_at < horizon
-        if late:
-            too_late.append(item.seq)
-        record = Record(room, offset, agent, item.seq, item.observed_at, now, item.kind, item.body, late)
-        plan.records.append(record)
-        for read in item.reads:
-            if (room, read.tag) not in known.registered:
-                _count_unknown(plan, agent, room, item, read)
     if new:
+        head, horizon = known.heads[room], _horizon(known, room, now, retention_us)
+        blocks = cut(batch, new, head, now, horizon)
+        plan.blocks += blocks
+        too_late = [block.seq + i for block, _ in blocks if block.late for i in range(block.records)]
         known.heads[room] = plan.heads[room] = head + len(new)
-        known.newest[room] = max(known.newest.get(room, new[0].observed_at), *(i.observed_at for i in new))
+        known.newest[room] = max(known.newest.get(room, blocks[0].block.last_at), *(b.block.last_at for b in blocks))
+        fresh = set() if len(new) == len(batch.seqs) else {batch.seqs[i] for i in new}
+        for read in batch.reads:
+            if (room, read.tag) not in known.registered and (not fresh or read.seq in fresh):
+                _count_unknown(plan, agent, room, read)
     known.agents[agent] = plan.agents[agent] = _seen(known.agents.get(agent), batch, new, now)
-    return Appended(len(new), len(batch.items) - len(new), 0, too_late)
+    return Appended(len(new), len(batch.seqs) - len(new), 0, too_late)
 
 
-def _new_items(batch: Batch, known: Known) -> list[Item]:
-    """The items that are not recorded yet. Raises ``Conflict`` naming those recorded with another body."""
-    agent, room = batch.agent, batch.room
-    new: dict[int, Item] = {}
+def _new(batch: Batch, known: Known) -> Sequence[int]:
+    """Indices of what is not recorded yet. Raises ``Conflict`` naming what is recorded with another body."""
+    agent, room, seqs = batch.agent, batch.room, batch.seqs
+    facts = known.agents.get(agent)
+    if (facts is None or min(seqs) >= facts.next_seq) and len(set(seqs)) == len(seqs):
+        return range(len(seqs))  # nearly always
+    new: dict[int, Observation] = {}
+    chosen: list[int] = []
     conflicts: list[ProblemItem] = []
-    for index, item in enumerate(batch.items):
-        earlier = new.get(item.seq)
-        recorded = known.stored.get((agent, item.seq)) if earlier is None else (room, earlier.body)
+    for index, (seq, observation) in enumerate(zip(seqs, batch.observations, strict=True)):
+        recorded = (room, new[seq]) if seq in new else known.stored.get((agent, seq))
         if recorded is None:
-            new[item.seq] = item
-        elif recorded != (room, item.body):
+            new[seq] = observation
+            chosen.append(index)
+        elif recorded[0] != room or _said(recorded[1]) != _said(observation):
             why = "in another room" if recorded[0] != room else "with another body"
             where = f"observations/{index}"
-            conflicts.append(
-                ProblemItem(where=where, why=f"seq {item.seq} is recorded {why}", index=index, seq=item.seq)
-            )
+            conflicts.append(ProblemItem(where=where, why=f"seq {seq} is recorded {why}", index=index, seq=seq))
     if conflicts:
         first = conflicts[0]
         raise Conflict(f"{agent}: {first.why}; nothing of the batch was recorded", items=conflicts[:100])
-    return list(new.values())
+    return chosen
+
+
+def _said(content: Content) -> str:
+    """What was sent, no more: a tag that is null and a tag that is absent are different observations."""
+    return content.model_dump_json(exclude_unset=True, by_alias=True)
 
 
 def _horizon(known: Known, room: str, now: int, retention_us: int | None) -> int | None:
@@ -138,29 +145,28 @@ def _horizon(known: Known, room: str, now: int, retention_us: int | None) -> int
     return None if retention_us is None or newest is None else min(newest, now) - retention_us
 
 
-def _seen(facts: AgentFacts | None, batch: Batch, new: list[Item], now: int) -> AgentFacts:
-    first, last = min(i.observed_at for i in batch.items), max(i.observed_at for i in batch.items)
-    facts = facts or AgentFacts(batch.agent, batch.room, 0, 0, now, now, first, "connected", "")
+def _seen(facts: AgentFacts | None, batch: Batch, new: Sequence[int], now: int) -> AgentFacts:
+    facts = facts or AgentFacts(batch.agent, batch.room, 0, 0, now, now, min(batch.times), "connected", "")
     # A report of the device's state that comes after newer observations says nothing about now.
     states = [
-        (item.observed_at, item.seq, item.state)
-        for item in new
-        if item.state is not None and item.observed_at >= facts.last_observed_at
+        (batch.times[i], batch.seqs[i], reported.state, reported.why)
+        for i in new
+        if isinstance(reported := batch.observations[i], AgentState) and batch.times[i] >= facts.last_observed_at
     ]
-    state, why = max(states)[2] if states else (facts.state, facts.why)
+    _, _, state, why = max(states) if states else (0, 0, facts.state, facts.why)
     return facts._replace(
         room=batch.room,
-        next_seq=max(facts.next_seq, *(item.seq + 1 for item in batch.items)),
+        next_seq=max(facts.next_seq, max(batch.seqs) + 1),
         received=facts.received + len(new),
         last_seen=now,
-        last_observed_at=max(facts.last_observed_at, last),
+        last_observed_at=max(facts.last_observed_at, max(batch.times)),
         state=state,
-        why=why,
+        why=why.replace("\0", ""),
     )
 
 
-def _count_unknown(plan: Plan, agent: str, room: str, item: Item, read: TagRead) -> None:
-    seen = UnknownRead(read.tag, room, agent, item.observed_at, item.observed_at, 1, read.label, read.x, read.y)
+def _count_unknown(plan: Plan, agent: str, room: str, read: TagRead) -> None:
+    seen = UnknownRead(read.tag, room, agent, read.observed_at, read.observed_at, 1, read.label, read.x, read.y)
     earlier = plan.unknown.get((room, read.tag))
     plan.unknown[room, read.tag] = seen if earlier is None else merge(earlier, seen)
 

@@ -8,12 +8,15 @@ from typing import Any
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 
 from tms_server.log import store
+from tms_server.log.blocks import MOST_RECORDS
+from tms_server.log.bodies import Content
 from tms_server.log.plan import AgentFacts, Known, Plan
 from tms_server.log.record import Batch
 
 _INSERT_LOG = f"""
 insert into log ({store.LOG_COLUMNS}) select * from unnest(
-    $1::text[], $2::bigint[], $3::text[], $4::bigint[], $5::bigint[], $6::bigint[], $7::text[], $8::text[], $9::bool[])
+    $1::text[], $2::bigint[], $3::text[], $4::bigint[], $5::bigint[], $6::bigint[], $7::bigint[], $8::bigint[],
+    $9::bool[], $10::text[])
 """
 _INSERT_AGENTS = f"""
 insert into agents ({store.AGENT_COLUMNS}) select * from unnest(
@@ -67,22 +70,25 @@ async def _read(driver: Any, batches: Sequence[Batch], newest: bool) -> Known:
     )
     facts = await driver.fetch(f"select {store.AGENT_COLUMNS} from agents where agent = any($1)", wanted.agents)
     agents = {row[0]: AgentFacts(*row) for row in facts}
-    stored: dict[tuple[str, int], tuple[str, str]] = {}
+    stored: dict[tuple[str, int], tuple[str, Content]] = {}
     for agent, seqs in store.repeated(batches, {a.agent: a.next_seq for a in agents.values()}).items():
-        select = "select seq, room, body from log where agent = $1 and seq = any($2)"
-        stored.update({(agent, seq): (room, body) for seq, room, body in await driver.fetch(select, agent, seqs)})
+        select = (
+            f"select {store.LOG_COLUMNS} from log where agent = $1 and seq between $2 and $3 and seq + records > $4"
+        )
+        low, high = min(seqs), max(seqs)
+        stored |= store.contents(await driver.fetch(select, agent, low - MOST_RECORDS + 1, high, low))
     select = "select room, tag from objects where tag = any($1)"
     registered = await driver.fetch(select, wanted.tags) if wanted.tags else []
     known = Known(dict(heads), {}, agents, stored, {(room, tag) for room, tag in registered})
     if newest:
-        select = "select room, max(observed_at) from log where room = $1 group by room"
-        known.newest = {r: t for room in wanted.rooms for r, t in await driver.fetch(select, room)}
+        found = {room: await driver.fetchval(store.NEWEST.format("$1"), room) for room in wanted.rooms}
+        known.newest = {room: at for room, at in found.items() if at is not None}
     return known
 
 
 async def _write(driver: Any, plan: Plan) -> None:
-    if plan.records:
-        await driver.execute(_INSERT_LOG, *_columns(plan.records))
+    if plan.blocks:
+        await driver.execute(_INSERT_LOG, *_columns(block for block, _ in plan.blocks))
         await driver.execute(
             "update rooms set head = new.head from unnest($1::text[], $2::bigint[]) as new (room, head)"
             " where rooms.room = new.room",

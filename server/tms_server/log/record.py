@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+from tms_schemas.observation import Observation
 from tms_server.errors import TmsError
+from tms_server.log.bodies import Content
 
 #: Registry records bear the agent ``@<room>``: no agent's name starts so.
 REGISTRY_MARK = "@"
+#: ``kind`` of registry records.
+REGISTRY = "registry"
 
 
 class Position(NamedTuple):
@@ -25,8 +30,7 @@ ORIGIN = Position(-(2**63), "", -1)
 class Record(NamedTuple):
     """One record. ``offset`` counts the room's records in order of commit, from 1, without gaps.
 
-    ``kind`` is the observation's type, or ``registry``; ``body`` canonical JSON of the observation (or of the
-    registry body). A ``late`` record arrived after the retention window: no belief is folded from it.
+    A ``late`` record arrived after the retention window: no belief is folded from it.
     """
 
     room: str
@@ -35,42 +39,44 @@ class Record(NamedTuple):
     seq: int
     observed_at: int
     received_at: int
-    kind: str
-    body: str
+    content: Content
     late: bool = False
 
     @property
     def position(self) -> Position:
         return Position(self.observed_at, self.agent, self.seq)
 
+    @property
+    def kind(self) -> str:
+        """The observation's type, or ``registry``."""
+        return REGISTRY if self.agent.startswith(REGISTRY_MARK) else self.content.type
+
 
 class TagRead(NamedTuple):
     """A tag that an observation read, and where, as far as the observation itself says."""
 
+    seq: int
+    observed_at: int
     tag: str
     label: str | None
     x: float | None
     y: float | None
 
 
-class Item(NamedTuple):
-    """One observation on its way into the log."""
-
-    seq: int
-    observed_at: int
-    kind: str
-    body: str
-    reads: tuple[TagRead, ...] = ()
-    #: (state, why) of an ``agent_state`` observation.
-    state: tuple[str, str] | None = None
-
-
 class Batch(NamedTuple):
-    """Observations of one agent in one room; recorded whole or not at all."""
+    """Observations of one agent in one room; recorded whole or not at all.
+
+    ``seqs`` and ``times`` (microseconds UTC) are theirs, in the same order; ``reads`` all tags they read.
+    ``body``: an ``ObservationBatch`` as JSON, with exactly these observations.
+    """
 
     agent: str
     room: str
-    items: list[Item]
+    observations: Sequence[Observation]
+    seqs: list[int]
+    times: list[int]
+    reads: list[TagRead]
+    body: str
 
 
 class Appended(NamedTuple):

@@ -6,61 +6,17 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter
 from sqlalchemy import delete, func, insert, literal, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from tms_schemas.base import Model, Tag
-from tms_schemas.rooms import RoomIn
 from tms_server.db.session import CHANGED_ROOMS
 from tms_server.db.tables import LogRow, RoomRow, UnknownTagRow
 from tms_server.db.times import to_us
 from tms_server.errors import NotFound
+from tms_server.log.blocks import SPAN_US
+from tms_server.log.bodies import ObjectRegistered, ObjectRemoved, RegistryBody
 from tms_server.log.record import REGISTRY_MARK
-
-REGISTRY = "registry"
-
-
-class TrackedObject(Model):
-    """All that the belief knows of an object. Weights in grams; ``size_m`` the width that a laser sees (metres)."""
-
-    tag: Tag
-    name: str
-    weight_g: float | None = None
-    weight_sd_g: float = 0.0
-    size_m: float | None = None
-
-
-class ObjectRegistered(TrackedObject):
-    """The room tracks the object from now on (or from before its tag was first seen as unknown)."""
-
-    type: Literal["object_registered"] = "object_registered"
-
-
-class ObjectChanged(TrackedObject):
-    """The whole new state of the object, not only what changed."""
-
-    type: Literal["object_changed"] = "object_changed"
-
-
-class ObjectRemoved(Model):
-    """The room tracks the object no more."""
-
-    type: Literal["object_removed"] = "object_removed"
-    tag: Tag
-
-
-class RoomChanged(Model):
-    """The room was made or changed; ``room`` is its whole new state."""
-
-    type: Literal["room_changed"] = "room_changed"
-    room: RoomIn
-
-
-RegistryBody = ObjectRegistered | ObjectChanged | ObjectRemoved | RoomChanged
-registry_body: TypeAdapter[RegistryBody] = TypeAdapter(Annotated[RegistryBody, Field(discriminator="type")])
 
 
 async def append_registry(session: AsyncSession, room: str, body: RegistryBody, *, now: datetime) -> None:
@@ -96,11 +52,12 @@ async def append_registry(session: AsyncSession, room: str, body: RegistryBody, 
             offset=head,
             agent=agent,
             seq=seq,
-            observed_at=effective_at,
+            records=1,
+            first_at=effective_at,
+            last_at=effective_at,
             received_at=to_us(now),
-            kind=REGISTRY,
-            body=body.model_dump_json(by_alias=True),
             late=False,
+            body=body.model_dump_json(by_alias=True),
         )
     )
     session.info.setdefault(CHANGED_ROOMS, set()).add(room)
@@ -108,14 +65,13 @@ async def append_registry(session: AsyncSession, room: str, body: RegistryBody, 
 
 async def _newest(session: AsyncSession, room: str, now: int) -> int:
     """From when a change counts: the room's newest observation, but never the future; 0 in an empty room."""
-    newest = await session.scalar(select(func.max(LogRow.observed_at)).where(LogRow.room == room))
+    start = select(func.max(LogRow.first_at)).where(LogRow.room == room).scalar_subquery() - SPAN_US
+    newest = await session.scalar(select(func.max(LogRow.last_at)).where(LogRow.room == room, LogRow.first_at >= start))
     return 0 if newest is None else min(newest, now)
 
 
 async def _removed(session: AsyncSession, agent: str, tag: str) -> int:
     """When the room last stopped tracking ``tag`` (0 if never): it cannot be registered again before that."""
     of_tag = literal(ObjectRemoved(tag=tag).model_dump_json(by_alias=True))
-    found = await session.scalar(
-        select(func.max(LogRow.observed_at)).where(LogRow.agent == agent, LogRow.body == of_tag)
-    )
+    found = await session.scalar(select(func.max(LogRow.last_at)).where(LogRow.agent == agent, LogRow.body == of_tag))
     return found or 0

@@ -22,7 +22,7 @@ class RoomLog(Protocol):
         """Records with a larger offset than ``after``, in pages, as they are committed. Never ends."""
 
     async def read(self, room: str, after: int, limit: int) -> list[Record]:
-        """The next ``limit`` records after an offset, in order of offset."""
+        """The next records after an offset, in order of offset: ``limit``, or a few more; fewer only at the end."""
 
     def replay(self, room: str, *, after: Position, until: Position | None, head: int) -> AsyncIterator[list[Record]]:
         """Records up to offset ``head`` with ``after < position <= until``, in fold order, in pages; none late."""

@@ -29,8 +29,9 @@ class SqlSnapshots:
             LogRow.room == SnapshotRow.room,
             LogRow.late.is_(False),
             LogRow.offset > SnapshotRow.offset,
-            LogRow.offset <= head,
-            tuple_(LogRow.observed_at, LogRow.agent, LogRow.seq) < place,
+            LogRow.offset - LogRow.records < head,
+            # Nothing in a block comes before this; a block that holds nothing too early may look as if it did.
+            tuple_(LogRow.first_at, LogRow.agent, LogRow.seq) < place,
         )
         query = (
             select(SnapshotRow.offset, SnapshotRow.observed_at, SnapshotRow.agent, SnapshotRow.seq, SnapshotRow.body)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, defaultdict
-from collections.abc import AsyncIterator, Iterable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from functools import partial
 from typing import Any
 
-from sqlalchemy import func, select, tuple_
+from sqlalchemy import Select, func, select, tuple_
 from sqlalchemy.engine import make_url
 from sqlalchemy.ext.asyncio import AsyncEngine
 
@@ -17,16 +17,18 @@ from tms_server.db.engine import is_sqlite
 from tms_server.db.tables import LogRow, RoomRow
 from tms_server.db.times import to_us
 from tms_server.errors import Unavailable
+from tms_server.log.blocks import MOST_RECORDS, SPAN_US, Block, records
+from tms_server.log.merging import Merge, start
 from tms_server.log.plan import decide
 from tms_server.log.postgres import PostgresStore
-from tms_server.log.record import Batch, Position, Record, Verdict
+from tms_server.log.record import ORIGIN, Batch, Position, Record, Verdict
 from tms_server.log.snapshots import sql_position
 from tms_server.log.sqlite import SqliteStore
 from tms_server.log.store import Store
 from tms_server.log.tail import Tail
 
-#: Records read at a time.
-PAGE = 1000
+#: Records that a follower gets at a time, and blocks read at a time for a replay.
+PAGE, _PAGE_BLOCKS = 1000, 50
 #: Seconds after which a follower looks by itself, should nobody have told it.
 _LOOK_AGAIN_S = 1.0
 _COLUMNS = (
@@ -34,11 +36,12 @@ _COLUMNS = (
     LogRow.offset,
     LogRow.agent,
     LogRow.seq,
-    LogRow.observed_at,
+    LogRow.records,
+    LogRow.first_at,
+    LogRow.last_at,
     LogRow.received_at,
-    LogRow.kind,
-    LogRow.body,
     LogRow.late,
+    LogRow.body,
 )
 
 
@@ -65,7 +68,7 @@ class SqlRoomLog:
         except Exception as error:
             raise Unavailable(f"the log cannot be written: {type(error).__name__}", retry_after_s=2) from error
         self._committed.update(plan.heads)
-        self._tail.add(plan.records)
+        self._tail.add(plan.blocks)
         for room in plan.heads:
             self._wake(room)
         return plan.verdicts
@@ -90,30 +93,43 @@ class SqlRoomLog:
                 looked = None
 
     async def read(self, room: str, after: int, limit: int) -> list[Record]:
-        query = select(*_COLUMNS).where(LogRow.room == room, LogRow.offset > after).order_by(LogRow.offset)
-        async with self._engine.connect() as connection:
-            return _records((await connection.execute(query.limit(limit))).all())
+        query = (
+            select(*_COLUMNS)
+            .where(LogRow.room == room, LogRow.offset > after, LogRow.offset <= after + limit + MOST_RECORDS)
+            .where(LogRow.offset - LogRow.records < after + limit)
+            .order_by(LogRow.offset)
+        )
+        blocks = await self._blocks(query)
+        found = await asyncio.to_thread(lambda: [record for block in blocks for record in records(block)])
+        return [record for record in found if record.offset > after]
 
     async def replay(
         self, room: str, *, after: Position, until: Position | None, head: int
     ) -> AsyncIterator[list[Record]]:
-        place = tuple_(LogRow.observed_at, LogRow.agent, LogRow.seq)
+        place = tuple_(LogRow.first_at, LogRow.agent, LogRow.seq)
+        earliest = max(after.observed_at - SPAN_US, ORIGIN.observed_at)
         query = (
             select(*_COLUMNS)
-            .where(LogRow.room == room, LogRow.offset <= head, LogRow.late.is_(False))
-            .order_by(LogRow.observed_at, LogRow.agent, LogRow.seq)
-            .limit(PAGE)
+            .where(LogRow.room == room, LogRow.offset - LogRow.records < head, LogRow.late.is_(False))
+            .where(LogRow.first_at >= earliest, LogRow.last_at >= after.observed_at)
+            .order_by(LogRow.first_at, LogRow.agent, LogRow.seq)
+            .limit(_PAGE_BLOCKS)
         )
         if until is not None:
             query = query.where(place <= sql_position(until))
+        merge, rest = Merge(after=after, until=until, head=head), query
         while True:
-            async with self._engine.connect() as connection:
-                page = _records((await connection.execute(query.where(place > sql_position(after)))).all())
-            if page:
+            blocks = await self._blocks(rest)
+            more = len(blocks) == _PAGE_BLOCKS
+            if page := await asyncio.to_thread(merge.take, blocks, more=more):
                 yield page
-            if len(page) < PAGE:
+            if not more:
                 return
-            after = page[-1].position
+            rest = query.where(place > sql_position(start(blocks[-1])))
+
+    async def _blocks(self, query: Select[*tuple[Any, ...]]) -> list[Block]:
+        async with self._engine.connect() as connection:
+            return [Block._make(row) for row in await connection.execute(query)]
 
     async def heads(self) -> dict[str, int]:
         async with self._engine.connect() as connection:
@@ -142,7 +158,3 @@ class SqlRoomLog:
 
     async def close(self) -> None:
         await self._store.close()
-
-
-def _records(rows: Iterable[Sequence[Any]]) -> list[Record]:
-    return [Record._make(row) for row in rows]

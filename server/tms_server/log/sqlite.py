@@ -7,11 +7,12 @@ import json
 import sqlite3
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import chain
 
 from tms_server.log import store
+from tms_server.log.blocks import MOST_RECORDS
+from tms_server.log.bodies import Content
 from tms_server.log.plan import AgentFacts, Known, Plan
-from tms_server.log.record import Batch, Record
+from tms_server.log.record import Batch
 
 #: Seconds that an append waits for the write lock of another connection.
 _PATIENCE_S = 10.0
@@ -71,22 +72,26 @@ def _read(connection: sqlite3.Connection, batches: Sequence[Batch], newest: bool
         _list(wanted.agents),
     )
     agents = {str(row[0]): AgentFacts(*row) for row in facts}  # type: ignore[arg-type]
-    stored: dict[tuple[str, int], tuple[str, str]] = {}
+    stored: dict[tuple[str, int], tuple[str, Content]] = {}
     for agent, seqs in store.repeated(batches, {a.agent: a.next_seq for a in agents.values()}).items():
-        select = "select seq, room, body from log where agent = ? and seq in (select value from json_each(?))"
-        stored.update({(agent, s): (r, b) for s, r, b in rows(select, agent, _list(seqs))})  # type: ignore[misc]
+        select = f"select {store.LOG_COLUMNS} from log where agent = ? and seq between ? and ? and seq + records > ?"
+        low, high = min(seqs), max(seqs)
+        stored |= store.contents(rows(select, agent, low - MOST_RECORDS + 1, high, low))
     select = "select room, tag from objects where tag in (select value from json_each(?))"
     registered = rows(select, _list(wanted.tags)) if wanted.tags else []
     known = Known(dict(heads), {}, agents, stored, set(registered))  # type: ignore[arg-type]
     if newest:
-        select = "select room, max(observed_at) from log where room = ? having count(*)"
-        known.newest = dict(row for room in wanted.rooms for row in rows(select, room))  # type: ignore[misc]
+        found = {room: rows(store.NEWEST.format("?1"), room)[0][0] for room in wanted.rooms}
+        known.newest = {room: at for room, at in found.items() if isinstance(at, int)}
     return known
 
 
 def _write(connection: sqlite3.Connection, plan: Plan) -> None:
     many = connection.executemany
-    _insert(connection, plan.records)
+    many(
+        f"insert into log ({store.LOG_COLUMNS}) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        [block for block, _ in plan.blocks],
+    )
     many("update rooms set head = ? where room = ?", [(head, room) for room, head in plan.heads.items()])
     many(
         f"insert into agents ({store.AGENT_COLUMNS}) values (?, ?, ?, ?, ?, ?, ?, ?, ?) {store.ON_AGENT_CONFLICT}",
@@ -97,20 +102,6 @@ def _write(connection: sqlite3.Connection, plan: Plan) -> None:
         + store.ON_UNKNOWN_CONFLICT,
         list(plan.unknown.values()),
     )
-
-
-def _insert(connection: sqlite3.Connection, records: Sequence[Record]) -> None:
-    """Many rows per statement: the driver gives the interpreter's lock away and fetches it back once for each step.
-
-    With one row per step every row would wait for whatever the event loop is doing.
-    """
-    at = 0
-    for size in (64, 16, 4, 1):
-        row = "(" + ", ".join("?" * len(Record._fields)) + ")"
-        statement = f"insert into log ({store.LOG_COLUMNS}) values {', '.join([row] * size)}"
-        while len(records) - at >= size:
-            connection.execute(statement, list(chain.from_iterable(records[at : at + size])))
-            at += size
 
 
 def _list(values: Sequence[object]) -> str:

@@ -6,9 +6,11 @@ that waited, whatever their number.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol, Self
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, Protocol, Self
 
+from tms_server.log.blocks import SPAN_US, Block, records
+from tms_server.log.bodies import Content
 from tms_server.log.plan import Known, Plan
 from tms_server.log.record import Batch
 
@@ -37,7 +39,7 @@ class Wanted(NamedTuple):
         return cls(
             sorted({batch.room for batch in batches}),
             sorted({batch.agent for batch in batches}),
-            sorted({read.tag for batch in batches for item in batch.items for read in item.reads}),
+            sorted({read.tag for batch in batches for read in batch.reads}),
         )
 
 
@@ -46,13 +48,23 @@ def repeated(batches: Sequence[Batch], next_seq: dict[str, int]) -> dict[str, li
     found: dict[str, list[int]] = {}
     for batch in batches:
         bound = next_seq.get(batch.agent, 0)
-        again = [item.seq for item in batch.items if item.seq < bound]
+        again = [seq for seq in batch.seqs if seq < bound]
         if again:
             found.setdefault(batch.agent, []).extend(again)
     return found
 
 
-LOG_COLUMNS = 'room, "offset", agent, seq, observed_at, received_at, kind, body, late'
+def contents(rows: Iterable[Sequence[Any]]) -> dict[tuple[str, int], tuple[str, Content]]:
+    """(agent, seq) -> room and content of everything in some blocks."""
+    found = [record for row in rows for record in records(Block(*row))]
+    return {(record.agent, record.seq): (record.room, record.content) for record in found}
+
+
+LOG_COLUMNS = 'room, "offset", agent, seq, records, first_at, last_at, received_at, late, body'
+#: The newest time of observation in the room ``{0}``. No block that starts earlier than this can reach farther.
+NEWEST = f"""
+select max(last_at) from log where room = {{0}}
+    and first_at >= (select max(first_at) from log where room = {{0}}) - {SPAN_US}"""
 AGENT_COLUMNS = "agent, room, next_seq, received, first_seen, last_seen, last_observed_at, state, why"
 UNKNOWN_COLUMNS = "tag, room, agent, first_seen, last_seen, count, label, x, y"
 

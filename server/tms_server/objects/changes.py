@@ -7,14 +7,8 @@ from datetime import datetime
 
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from tms_server.log.registry import (
-    ObjectChanged,
-    ObjectRegistered,
-    ObjectRemoved,
-    RegistryBody,
-    TrackedObject,
-    append_registry,
-)
+from tms_server.log.bodies import ObjectChanged, ObjectRegistered, ObjectRemoved, RegistryBody, TrackedObject
+from tms_server.log.registry import append_registry
 
 #: The room that tracks an object and what its belief knows of it; None where no room does.
 Tracked = tuple[str, TrackedObject] | None

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from tms_schemas.objects import ObjectFields, Product, ProductIn, Shape, Size, TownObject
 from tms_server.db.tables import ObjectRow, ProductRow
 from tms_server.db.times import from_us
-from tms_server.log.registry import TrackedObject
+from tms_server.log.bodies import TrackedObject
 from tms_server.objects.search import search_text
 
 

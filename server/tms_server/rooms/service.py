@@ -16,7 +16,8 @@ from tms_server.db.tables import RoomRow
 from tms_server.db.times import from_us, to_us
 from tms_server.db.turns import take_turn
 from tms_server.errors import Invalid, NotFound
-from tms_server.log.registry import RoomChanged, append_registry
+from tms_server.log.bodies import RoomChanged
+from tms_server.log.registry import append_registry
 from tms_server.placement.parameters import ParameterError, Parameters
 from tms_server.rooms.polygons import Ring, require_area
 from tms_server.rooms.repository import RoomRepository

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import logging
 
-from pydantic import TypeAdapter, ValidationError
-
 from tms_schemas import events
+from tms_schemas.observation import AgentState, Inventory, Observation, PoseReport, RawRead
+from tms_server.log.bodies import ObjectRemoved, RoomChanged, TrackedObject, Unreadable
 from tms_server.log.record import ORIGIN, Position, Record
-from tms_server.log.registry import REGISTRY, registry_body
 from tms_server.placement import OUT, DrawKey, Engine, InvalidEvent, Parameters
 from tms_server.town import inventory, packing, registry, reports, sight
 from tms_server.town.resolve import UnknownMover, resolved
 from tms_server.town.state import AgentInfo, Evidence, Fault, LabelInfo, RoomState
 
 _log = logging.getLogger(__name__)
-_core: TypeAdapter[events.Event] = TypeAdapter(events.AnyEvent)
 
 
 class RoomFold:
@@ -41,24 +39,28 @@ class RoomFold:
         """Fold the next record. Its position must be after ``self.position``."""
         self.position, self._record, self._parts = record.position, record, 0
         try:
-            if record.kind == REGISTRY:
-                registry.apply(self, registry_body.validate_json(record.body))
-                return
-            known = self.state.agents.get(record.agent)
-            self.state.agents[record.agent] = AgentInfo(record.observed_at, known.state if known else "connected")
-            match record.kind:
-                case "inventory":
-                    inventory.reconcile(self, record)
-                case "raw_read" | "pose" | "agent_state":
-                    reports.apply(self, record)
-                case _:
-                    self.fold(_core.validate_json(record.body, extra="ignore"))
-        except ValidationError as error:
-            self.note("unreadable", f"{record.kind}: {error.errors()[0]['msg']}")
+            match record.content:
+                case Unreadable(kind=kind, why=why):
+                    self.note("unreadable", f"{kind}: {why}")
+                case TrackedObject() | ObjectRemoved() | RoomChanged() as change:
+                    registry.apply(self, change)
+                case observation:
+                    self._observe(record, observation)
         except Exception as error:
             # A defect, and the same one at every replay: the room must not stand still for ever because of one record.
             _log.exception("record %d of room %s cannot be folded", record.offset, record.room)
             self.note("failed", f"{record.kind}: {type(error).__name__}")
+
+    def _observe(self, record: Record, observation: Observation) -> None:
+        known = self.state.agents.get(record.agent)
+        self.state.agents[record.agent] = AgentInfo(record.observed_at, known.state if known else "connected")
+        match observation:
+            case Inventory():
+                inventory.reconcile(self, observation)
+            case RawRead() | PoseReport() | AgentState():
+                reports.apply(self, observation)
+            case event:
+                self.fold(event)
 
     def fold(self, event: events.Event, *, p_jump: float | None = None) -> None:
         """One event of the vocabulary: give it to the engine, and keep what it says of labels and tags."""

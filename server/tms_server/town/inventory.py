@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING
 
 from tms_schemas.events import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft, TagObserved
 from tms_schemas.observation import Inventory, InventoryLabel
-from tms_server.log.record import Record
 from tms_server.town.sight import P_UNSEEN
 
 if TYPE_CHECKING:
     from tms_server.town.fold import RoomFold
 
 
-def reconcile(fold: RoomFold, record: Record) -> None:
+def reconcile(fold: RoomFold, inventory: Inventory) -> None:
     """Vanished labels, movers, new labels, then reads: the order of one instant."""
-    items = {item.label: item for item in Inventory.model_validate_json(record.body).labels}
-    known = {name: info for name, info in fold.state.labels.items() if info.agent == record.agent and not info.ghost}
+    items, agent = {item.label: item for item in inventory.labels}, fold.record.agent
+    known = {name: info for name, info in fold.state.labels.items() if info.agent == agent and not info.ghost}
 
     for name, info in known.items():
         if name not in items:

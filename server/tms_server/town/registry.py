@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tms_server.log.registry import ObjectRemoved, RegistryBody, RoomChanged, TrackedObject
+from tms_server.log.bodies import ObjectRemoved, RegistryBody, RoomChanged, TrackedObject
 from tms_server.placement import ObjectSpec, ParameterError, Parameters
 
 if TYPE_CHECKING:

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-from pydantic import Field, TypeAdapter
+from typing import TYPE_CHECKING
 
 from tms_schemas.events import LabelMoved, MoverEntered, TagMissed, TagObserved
 from tms_schemas.observation import AgentState, PoseReport, RawRead
 from tms_schemas.rooms import Zone
-from tms_server.log.record import Record
 from tms_server.town.geometry import inside
 
 if TYPE_CHECKING:
     from tms_server.town.fold import RoomFold
 
-_report: TypeAdapter[RawRead | PoseReport | AgentState] = TypeAdapter(
-    Annotated[RawRead | PoseReport | AgentState, Field(discriminator="type")]
-)
 
-
-def apply(fold: RoomFold, record: Record) -> None:
-    match _report.validate_json(record.body):
+def apply(fold: RoomFold, report: RawRead | PoseReport | AgentState) -> None:
+    match report:
         case RawRead() as read:
             _zone_read(fold, read)
-        case PoseReport() as report:
-            _pose(fold, report)
+        case PoseReport() as pose:
+            _pose(fold, pose)
         case AgentState(state=state):
-            fold.state.agents[record.agent] = fold.state.agents[record.agent]._replace(state=state)
+            agent = fold.record.agent
+            fold.state.agents[agent] = fold.state.agents[agent]._replace(state=state)
 
 
 def _zone_read(fold: RoomFold, read: RawRead) -> None:

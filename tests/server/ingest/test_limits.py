@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,13 @@ import httpx
 import pytest
 from sqlalchemy import text
 
+from tms_schemas.observation import AgentState
 from tms_server.errors import TmsError, TooManyRequests, Unavailable
 from tms_server.ingest.writer import GroupWriter
-from tms_server.log.record import Appended, Batch, Item
+from tms_server.log.record import Appended, Batch
 from tms_server.settings import Settings
+
+STATE = AgentState(seq=0, observed_at=datetime.fromtimestamp(0, UTC), state="connected")
 
 
 class SlowLog:
@@ -30,11 +34,11 @@ class SlowLog:
         self.groups.append(len(batches))
         if self.failure is not None:
             raise self.failure
-        return [Appended(len(batch.items), 0, 1, []) for batch in batches]
+        return [Appended(len(batch.observations), 0, 1, []) for batch in batches]
 
 
 def batch(agent: str, size: int) -> Batch:
-    return Batch(agent, "lab", [Item(seq, 0, "pose", "{}") for seq in range(size)])
+    return Batch(agent, "lab", [STATE] * size, list(range(size)), [0] * size, [], "{}")
 
 
 @pytest.fixture

@@ -18,8 +18,9 @@ from tms_server.db.migrate import migrate
 from tms_server.db.session import Sessions
 from tms_server.db.tables import RoomRow
 from tms_server.ingest.admission import admit
+from tms_server.log.bodies import ObjectRegistered, RegistryBody, RoomChanged
 from tms_server.log.record import Appended
-from tms_server.log.registry import ObjectRegistered, RegistryBody, RoomChanged, append_registry
+from tms_server.log.registry import append_registry
 from tms_server.settings import Settings
 from tms_server.town import RoomView, Town, open_town
 from tms_server.town.fold import RoomFold

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tms_server.log.registry import ObjectChanged, ObjectRegistered, ObjectRemoved
+from tms_server.log.bodies import ObjectChanged, ObjectRegistered, ObjectRemoved
 
 PERSON = {"type": "mover_entered", "label": "floor/1", "xy": [1.0, 1.0]}
 THING = {"type": "label_appeared", "label": "cab/1", "kind": "cabinet", "xy": [0.5, 0.5], "tag": "E1"}
