@@ -29,6 +29,7 @@ from tms_client.errors import (
     Unreachable,
 )
 from tms_client.flows import Retry
+from tms_client.grasping import Gripper
 from tms_client.posting import AsyncPoster, Poster
 from tms_client.spool import DeadLetter, Spool
 from tms_client.town import Town
@@ -43,6 +44,7 @@ __all__ = [
     "Conflict",
     "DeadLetter",
     "Forbidden",
+    "Gripper",
     "Invalid",
     "Location",
     "NotFound",
