@@ -34,3 +34,22 @@ class RoundEnd:
 
 
 TagItem = TagRead | RoundEnd
+
+
+class Field:
+    """The RF field of a reader as someone beside it needs it: load cells are disturbed by it, so weighing pauses it.
+
+    One object is shared by all sessions of a link, so that a reader that reconnects does not radiate into a weighing.
+    """
+
+    def __init__(self) -> None:
+        self.wanted = True
+        #: What the session knows: True only after the reader confirmed that it does not radiate.
+        self.is_off = False
+
+    def pause(self) -> None:
+        """Ask for silence; the round under way is broken off. ``is_off`` tells when it is reached."""
+        self.wanted = False
+
+    def resume(self) -> None:
+        self.wanted, self.is_off = True, False

@@ -12,7 +12,8 @@ MODE, READ, INVENTORY = 0x4E, 0x4F, 0x78
 _STX, _ETX, _CR = 0x02, 0x03, 0x0D
 _AROUND = 7  # bytes of a frame that are not data
 MAX_FRAME = _AROUND + 255
-_NACK_REASONS = {0x42: "sum error", 0x44: "format error"}
+SUM_ERROR, FORMAT_ERROR = 0x42, 0x44
+_NACK_REASONS = {SUM_ERROR: "sum error", FORMAT_ERROR: "format error"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +38,11 @@ class Frame:
         """Why the reader refuses a command, None where it does not."""
         if self.command != NACK:
             return None
-        code = self.data[-1] if self.data else 0
-        return _NACK_REASONS.get(code, f"refusal code {code:02X}")
+        return _NACK_REASONS.get(self.refusal_code, f"refusal code {self.refusal_code:02X}")
+
+    @property
+    def refusal_code(self) -> int:
+        return self.data[-1] if self.data else 0
 
 
 class FrameParser:
@@ -108,6 +112,24 @@ def select_antenna(antenna: int) -> Frame:
     return Frame(MODE, bytes([0x9C, antenna]))
 
 
-def inventory() -> Frame:
-    """Inventory2 with anti-collision: answered by ``ACK F0 n`` and n UID frames."""
-    return Frame(INVENTORY, bytes([0xF0, 0x00, 0x01]))
+#: The two ways to ask for Inventory2 with anti-collision: a model takes one or both (00: TR3, 40: TR3XM).
+INVENTORY_OPTIONS = (0x00, 0x40)
+
+
+def inventory(option: int = INVENTORY_OPTIONS[0]) -> Frame:
+    """Inventory2: answered by ``ACK F0 n`` and n UID frames."""
+    return Frame(INVENTORY, bytes([0xF0, option, 0x01]))
+
+
+def acknowledges(reply: Frame, command: Frame) -> bool:
+    """Whether ``reply`` is the ACK of ``command`` and not a late one of an earlier command.
+
+    The reader repeats the sub-command (and the antenna) in its ACK; some models leave the data out.
+    """
+    if reply.command != ACK:
+        return False
+    if command.command == INVENTORY:
+        return reply.data[:1] == b"\xf0" and len(reply.data) >= 2
+    if command.data[:1] == b"\x9c":
+        return reply.data[:2] == command.data[:2]
+    return reply.data[:1] in (b"", command.data[:1])
