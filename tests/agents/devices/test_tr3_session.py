@@ -123,7 +123,7 @@ def test_a_command_that_arrived_damaged_is_sent_again_and_other_refusals_say_why
     device.inventory_options = ()
     with pytest.raises(DeviceFault, match="refuses command 02 00 78 03 F0 40 01 03 B1 0D: format error"):
         converse(session(clock), device, clock, 0.2)
-    with pytest.raises(DeviceFault, match="refuses command 02 00 4E 02 9C 09 .*: format error"):
+    with pytest.raises(DeviceFault, match=r"refuses command 02 00 4E 02 9C 09 .*: format error"):
         converse(session(clock, antennas=(0, 9)), reader(), clock, 0.2)
     device.nack_code, device.nack_next = 0x17, 99
     with pytest.raises(DeviceFault, match="refusal code 17"):

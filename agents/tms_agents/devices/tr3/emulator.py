@@ -45,7 +45,10 @@ class Tr3Device:
         self.power_cycle_after: int | None = None
         self.power_cycles = 0
         self.heard: list[Frame] = []
-        self._switch_on()
+        self.antenna, self.rf_on = 0, True
+        self._starting, self._rdloop = False, False
+        self._reported: set[str] = set()
+        self._parser = FrameParser()
 
     @property
     def radiating(self) -> int | None:
@@ -78,19 +81,17 @@ class Tr3Device:
         frames = (Frame(RDLOOP, bytes.fromhex(uid)[::-1] + bytes(16)) for uid in self.tags[self.antenna])
         return self._out(b"".join(frame.encode() for frame in frames))
 
-    def _switch_on(self) -> None:
-        self.antenna = 0
-        self.rf_on = True
-        self._starting = self.power_cycles > 0
-        self._rdloop = False
-        self._reported: set[str] = set()
+    def _restart(self) -> None:
+        self.power_cycles += 1
+        self.antenna, self.rf_on = 0, True
+        self._starting, self._rdloop = True, False
+        self._reported.clear()
         self._parser = FrameParser()
 
     def _out(self, answer: bytes) -> bytes:
         if self.power_cycle_after is not None and len(answer) >= self.power_cycle_after:
             answer, self.power_cycle_after = answer[: self.power_cycle_after], None
-            self.power_cycles += 1
-            self._switch_on()
+            self._restart()
         elif self.power_cycle_after is not None:
             self.power_cycle_after -= len(answer)
         return b"" if self.silent else answer
