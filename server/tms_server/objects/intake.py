@@ -25,7 +25,7 @@ from tms_server.db.times import from_us
 from tms_server.db.turns import take_turn
 from tms_server.errors import Conflict, Invalid
 from tms_server.keys.scopes import Principal
-from tms_server.objects.gtin import gtin_of_epc
+from tms_server.objects.gtin import gtin_of_epc, in_store, names_its_company
 from tms_server.objects.products import store_products
 from tms_server.objects.repository import ObjectRepository, ProductRepository, UnknownTagRepository
 from tms_server.objects.service import checked_jan, store
@@ -35,21 +35,27 @@ from tms_server.objects.views import Stored, own_fields, town_product
 async def intake(session: AsyncSession, clock: Clock, caller: Principal, request: IntakeRequest) -> IntakeResult:
     """Register ``request.tag``, or confirm that it is registered so.
 
-    The JAN comes from the request or from an SGTIN-96 tag itself; name and all else from its product. What the object
-    lacks is filled in; what it has and the request says otherwise is a conflict, never overwritten.
+    The JAN comes from the request or from an SGTIN-96 tag itself, where that can be trusted; name and all else from
+    its product. What the object lacks is filled in; what it has and the request says otherwise is a conflict, never
+    overwritten. An in-store number that the catalogue lacks names no product: the object is registered by its name.
 
     Raises:
         Invalid: no name to be had, a wrong or contradicting JAN, an unknown room.
         Conflict: the tag is registered as something else.
         Forbidden: the key may not observe in the room.
     """
-    jan = _jan(request)
     await take_turn(session)
+    jan = await _jan(session, request)
     before = await ObjectRepository(session).get(request.tag)
     room = await _room(session, caller, request, before)
     _authorise(caller, room, before)
-    product = await _product(session, clock, jan, request.name)
-    wanted: dict[str, Any] = {"jan": jan, "room": room, "name": request.name, "synonyms": request.synonyms}
+    product = await _product(session, clock, jan, request)
+    wanted: dict[str, Any] = {
+        "jan": product.jan if product else None,
+        "room": room,
+        "name": request.name,
+        "synonyms": request.synonyms,
+    }
     if before is None:
         wanted["name"] = request.name or (product.name if product else None)
         fields = ObjectFields.model_validate(wanted)
@@ -69,14 +75,18 @@ async def list_unknown_tags(
     return UnknownTagPage(items=[_unknown(row) for row in page], next_cursor=following)
 
 
-def _jan(request: IntakeRequest) -> str | None:
+async def _jan(session: AsyncSession, request: IntakeRequest) -> str | None:
+    """What the scanner says, or the tag itself. Tags in use carry made-up numbers too: those say nothing."""
     inside = gtin_of_epc(request.tag)
+    trusted = inside is not None and (
+        names_its_company(request.tag) or await ProductRepository(session).get(inside) is not None
+    )
     if request.jan is None:
-        return inside
+        return inside if trusted else None
     jan = checked_jan(request.jan)
-    if inside is not None and inside != jan:
-        why = f"the tag itself names product {inside}, not {jan}"
-        raise Invalid(f"jan: {why}", items=[ProblemItem(where="jan", why=why)])
+    if inside is not None and trusted and inside != jan:
+        packing = f" (packing level {inside[0]} of it)" if len(inside) == 14 and inside[1:13] == jan[:12] else ""
+        raise _refused(f"the tag itself names product {inside}, not {jan}{packing}")
     return jan
 
 
@@ -99,22 +109,30 @@ def _authorise(caller: Principal, room: str | None, before: Stored | None) -> No
             require_observe(caller, name)
 
 
-async def _product(session: AsyncSession, clock: Clock, jan: str | None, name: str | None) -> Product | None:
+async def _product(session: AsyncSession, clock: Clock, jan: str | None, request: IntakeRequest) -> Product | None:
     """The product of ``jan``; one that the catalogue lacks is added under the name given."""
     if jan is None:
-        if name is None:
-            why = "the tag names no product by itself: give a JAN of the catalogue, or a name"
-            raise Invalid(f"jan: {why}", items=[ProblemItem(where="jan", why=why)])
-        return None
+        if request.name is not None:
+            return None
+        inside = gtin_of_epc(request.tag)
+        if inside is None:
+            raise _refused("the tag names no product by itself: give a JAN of the catalogue, or a name")
+        why = f"the tag's number {inside} is in no catalogue and of no known company"
+        raise _refused(f"{why}: give a JAN of the catalogue, or a name")
     row = await ProductRepository(session).get(jan)
     if row is not None:
         return town_product(row)
-    if name is None:
-        why = f"product {jan} is not in the catalogue: give a name as well, or PUT /v1/products/{jan} first"
-        raise Invalid(f"jan: {why}", items=[ProblemItem(where="jan", why=why)])
-    product = ProductIn(name=name)
+    if request.name is None:
+        raise _refused(f"product {jan} is not in the catalogue: give a name as well, or PUT /v1/products/{jan} first")
+    if in_store(jan):
+        return None
+    product = ProductIn(name=request.name)
     await store_products(session, clock, {jan: product})
     return Product(jan=jan, **dict(product))
+
+
+def _refused(why: str) -> Invalid:
+    return Invalid(f"jan: {why}", items=[ProblemItem(where="jan", why=why)])
 
 
 def _filled(known: ObjectFields, wanted: dict[str, Any]) -> ObjectFields:

@@ -13,6 +13,10 @@ Registry = Callable[[str], Awaitable[list[dict[str, Any]]]]
 TEA = "4901234567894"
 #: The example of the GS1 Tag Data Standard: GTIN 80614141123458, serial 6789.
 SGTIN = "3074257BF7194E4000001A85"
+#: urn:epc:id:sgtin:4901777.101868.123, a packing (indicator 1) of JAN 4901777018686.
+PACKING = "30352B2E44637B000000007B"
+#: urn:epc:id:sgtin:490177.0701868.77: decodes to a GTIN, but its company prefix has the wrong length.
+MADE_UP, MADE_UP_GTIN = "3039DEB042AD6B000000004D", "4901777018686"
 
 
 async def intake(town: httpx.AsyncClient, tag: str = "E1", **body: Any) -> httpx.Response:
@@ -45,6 +49,41 @@ async def test_an_sgtin_tag_alone_is_enough(town: httpx.AsyncClient) -> None:
     contradicting = await intake(town, SGTIN, jan=TEA)
     assert contradicting.status_code == 422
     assert "80614141123458" in contradicting.json()["detail"]
+
+
+async def test_a_tag_of_a_packing_is_not_the_thing_in_it(town: httpx.AsyncClient) -> None:
+    await town.put("/v1/products/14901777018683", json={"name": "24 bottles of tea", "weight_g": 12_900})
+    await town.put("/v1/products/4901777018686", json={"name": "tea", "weight_g": 525})
+    answer = await intake(town, PACKING)
+    assert (answer.json()["object"]["name"], answer.json()["object"]["weight_g"]) == ("24 bottles of tea", 12_900)
+    scanned = await intake(town, PACKING[:-1] + "0", jan="4901777018686")
+    assert scanned.status_code == 422 and "packing level 1" in scanned.json()["detail"]
+
+
+async def test_a_number_made_up_is_not_taken_for_a_product(town: httpx.AsyncClient) -> None:
+    """A laboratory's EPC that happens to decode: it neither names a product nor contradicts the scanner."""
+    alone = await intake(town, MADE_UP)
+    assert alone.status_code == 422 and "of no known company" in alone.json()["detail"]
+    assert (await intake(town, MADE_UP, jan=TEA)).status_code == 201
+    assert (await town.get("/v1/products", params={"q": ""})).json()["items"][0]["jan"] == TEA
+
+
+async def test_a_made_up_number_that_is_in_the_catalogue_is_trusted(town: httpx.AsyncClient) -> None:
+    await town.put(f"/v1/products/{MADE_UP_GTIN}", json={"name": "our own box"})
+    assert (await intake(town, MADE_UP)).json()["object"]["name"] == "our own box"
+    assert (await intake(town, MADE_UP[:-1] + "0", jan=TEA)).status_code == 422
+
+
+async def test_an_in_store_number_is_nobodys_product(town: httpx.AsyncClient) -> None:
+    shop = "2012345000018"
+    assert (await intake(town, "E1", jan=shop)).status_code == 422
+    answer = await intake(town, "E1", jan=shop, name="小松菜")
+    assert answer.status_code == 201
+    assert (answer.json()["object"]["name"], answer.json()["object"]["jan"]) == ("小松菜", None)
+    assert (await town.get(f"/v1/products/{shop}")).status_code == 404
+    assert (await intake(town, "E1", jan=shop, name="小松菜")).status_code == 200
+    await town.put(f"/v1/products/{shop}", json={"name": "our bread"})  # said on purpose
+    assert (await intake(town, "E2", jan=shop)).json()["object"]["name"] == "our bread"
 
 
 async def test_again_is_no_change_and_otherwise_a_conflict(town: httpx.AsyncClient, registry: Registry) -> None:
