@@ -1,0 +1,168 @@
+"""The host side of the board: ask one cell after the other, and never take an answer for that of another cell.
+
+An answer does not say which cell it is of, so one question is on the way at a time, and three things are doubtful:
+
+* an answer that does not come in time may still come later: its cell is NaN, and nothing is asked until the line was
+  quiet for ``late_s``; what comes in that time is thrown away;
+* a line that is no number may have been an answer or come beside it: the same;
+* a line that nobody asked for says that an earlier answer was shifted to the next cell: the whole round is dropped.
+
+So that the last of these is seen in time, a round is kept back until the line was quiet for twice the slowest of the
+last answers, and handed out with the first answer of the next round. The numbers themselves carry no check sum: a wrong
+digit is for the estimator to find.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Callable
+
+from tms_agents.devices.lines import LineParser
+from tms_agents.devices.loads import LoadSample
+
+#: Sensor index -> the character that asks for it.
+INDEX = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_NUMBER = re.compile(rb"\s*([+-]?\d{1,10})\s*")
+_OLD_FIRMWARE = re.compile(rb'[OK"]')
+_LONGEST_LINE = 40
+#: A cell that missed this many answers in a row is asked less often, so that it does not slow down the others.
+_MISSES = 3
+#: The line counts as quiet only after that many looks at it: this process may itself have slept in between.
+_LOOKS = 3
+#: How fast the slowest answer is forgotten, per answer.
+_FORGET = 0.999
+
+
+class RosTmsBoardSession:
+    """Delivers a ``LoadSample`` of counts per round, one round every ``period_s`` seconds if the board is fast enough.
+
+    The link should tick several times a period. ``reply_s``: an answer later than this is missing. A cell that misses
+    three in a row is NaN from then on and asked every ``retry_s``; ``fault`` names it. Only answers count as signs of
+    life, so a board that gives none is silent for the link, and delivers nothing.
+
+    Raises:
+        ValueError: more cells than there are indices, or none.
+    """
+
+    def __init__(
+        self,
+        *,
+        cells: int = 4,
+        period_s: float = 0.02,
+        reply_s: float = 0.05,
+        late_s: float = 0.1,
+        retry_s: float = 1.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if not 1 <= cells <= len(INDEX):
+            raise ValueError(f"a board has 1 to {len(INDEX)} cells, not {cells}")
+        self.frames = 0
+        self.ready = False
+        #: Rounds thrown away because an answer came that nobody had asked for.
+        self.doubtful_rounds = 0
+        self._period_s, self._reply_s, self._late_s, self._retry_s = period_s, reply_s, late_s, retry_s
+        self._clock = clock
+        self._lines = LineParser(_LONGEST_LINE)
+        self._output = bytearray()
+        self._values = [float("nan")] * cells
+        self._misses = [0] * cells
+        self._ask_again = [0.0] * cells
+        self._round: list[int] = []  # cells still to ask
+        self._asked: int | None = None
+        self._asked_at = self._heard_at = self._next_round = clock()
+        self._draining, self._open_round, self._looks = True, False, 0
+        self._slowest_s = 0.0
+        self._done: list[LoadSample] = []
+
+    def opened(self) -> None:
+        """What a former host asked for is thrown away first."""
+        self._heard_at = self._clock()
+
+    def receive(self, data: bytes) -> list[LoadSample]:
+        now = self._heard_at = self._clock()
+        self._looks = 0
+        for line in self._lines.feed(data):
+            self._line(_OLD_FIRMWARE.sub(b"", line), now)
+        done, self._done = self._done, []
+        return done
+
+    def tick(self) -> None:
+        now = self._clock()
+        self._looks += 1
+        if self._asked is not None:
+            if self._quiet(now - self._asked_at, self._reply_s):
+                self._miss(now)
+        elif self._draining:
+            if self._quiet(now - self._heard_at, self._late_s):
+                self._lines.expire()
+                self._draining = False
+                self._ask_next(now)
+        elif self._open_round and self._quiet(now - self._heard_at, min(2 * self._slowest_s, self._late_s)):
+            self._finish()
+        if self._asked is None and not self._draining and not self._open_round and now >= self._next_round:
+            self._start(now)
+
+    def output(self) -> bytes:
+        data = bytes(self._output)
+        self._output.clear()
+        return data
+
+    def closing(self) -> bytes:
+        return b""
+
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete line."""
+        return self._lines.pending
+
+    def _quiet(self, since_s: float, enough_s: float) -> bool:
+        return since_s >= enough_s and self._looks >= _LOOKS
+
+    def _start(self, now: float) -> None:
+        self._next_round = max(self._next_round + self._period_s, now)
+        self._values = [float("nan")] * len(self._values)
+        self._round = [
+            cell for cell in range(len(self._values)) if self._misses[cell] < _MISSES or now >= self._ask_again[cell]
+        ]
+        self._open_round = bool(self._round)
+        self._ask_next(now)
+
+    def _ask_next(self, now: float) -> None:
+        if self._round:
+            self._asked, self._asked_at, self._looks = self._round.pop(0), now, 0
+            self._output += INDEX[self._asked].encode()
+
+    def _line(self, line: bytes, now: float) -> None:
+        number = _NUMBER.fullmatch(line)
+        if not line.strip() or self._draining:
+            return
+        if self._asked is None:
+            self.doubtful_rounds += bool(self._open_round or self._done)
+            self._done.clear()
+            self._round, self._open_round, self._draining = [], False, True
+        elif number is None:
+            self._miss(now)
+        else:
+            self._values[self._asked] = float(number[1])
+            self._misses[self._asked] = 0
+            self._slowest_s = max(self._slowest_s * _FORGET, now - self._asked_at)
+            self._asked = None
+            self.frames += 1
+            self.ready = True
+            self._ask_next(now)
+
+    def _miss(self, now: float) -> None:
+        assert self._asked is not None
+        self._misses[self._asked] += 1
+        self._ask_again[self._asked] = now + self._retry_s
+        self._asked, self._draining = None, True
+        self._heard_at, self._looks = now, 0
+
+    def _finish(self) -> None:
+        self._open_round = False
+        dead = [str(cell) for cell, misses in enumerate(self._misses) if misses >= _MISSES]
+        fault = f"no answer from cell {', '.join(dead)}" if dead else ""
+        if not all(map(math.isnan, self._values)):
+            self._done.append(LoadSample(values=tuple(self._values), fault=fault))

@@ -1,0 +1,104 @@
+"""The board behind real terminals and ports: readings, states, a pulled cable."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import random
+
+import pytest
+
+from tms_agents.devices.emulation import PtyLine, TcpLine
+from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
+from tms_agents.devices.loads import LoadSample
+from tms_agents.devices.transport import DeviceState, Link, serial, tcp
+from tms_client import Retry
+
+QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
+
+
+def board(opener, **options) -> Link[LoadSample]:
+    options = {"silent_after_s": 0.5, "tick_s": 0.002, "retry": QUICK, **options}
+    return Link(opener, RosTmsBoardSession, name="board", **options)
+
+
+async def until(link, wanted, act=None, timeout_s: float = 8.0):
+    seen = []
+    async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
+        async for arrived in items:
+            for item in [arrived] if isinstance(arrived, DeviceState) else arrived:
+                seen.append(item)
+                if wanted(seen):
+                    return seen
+                if act:
+                    act(item)
+    raise AssertionError("the link ended")
+
+
+def samples(seen):
+    return [item for item in seen if isinstance(item, LoadSample)]
+
+
+def states(seen):
+    return [item.state for item in seen if isinstance(item, DeviceState)]
+
+
+@pytest.mark.parametrize("kind", ["pty", "tcp"])
+async def test_counts_come_over_a_line(kind):
+    device = RosTmsBoardDevice(lambda t: [10, -20, 30.4, 123456])
+    async with PtyLine(device) if kind == "pty" else TcpLine(device) as line:
+        opener = serial(line.path, 115200) if kind == "pty" else tcp("127.0.0.1", line.port)
+        seen = await until(board(opener), lambda seen: len(samples(seen)) == 5)
+        assert states(seen) == ["connected"]
+        assert {sample.values for sample in samples(seen)} == {(10.0, -20.0, 30.0, 123456.0)}
+        assert set(device.heard) == set("0123")
+
+
+async def test_a_pulled_cable_is_said_and_recovers_without_restart():
+    device = RosTmsBoardDevice(lambda t: [1, 2, 3, 4])
+    async with PtyLine(device) as line:
+        pulled = False
+
+        def pull(item):
+            nonlocal pulled
+            if isinstance(item, LoadSample) and not pulled:
+                pulled = True
+                line.hang_up()
+                asyncio.get_running_loop().call_later(0.15, line.plug_in)
+
+        def back(seen):
+            return "faulty" in states(seen) and isinstance(seen[-1], LoadSample)
+
+        seen = await until(board(serial(line.path, 115200)), back, pull)
+        assert states(seen)[0] == "connected" and states(seen)[-1] == "connected"
+        whys = [item.why for item in seen if isinstance(item, DeviceState) and item.state == "faulty"]
+        assert any("closed" in why for why in whys) and any("No such file" in why for why in whys)
+
+
+async def test_garbage_a_power_cycle_and_silence_on_a_real_line():
+    device = RosTmsBoardDevice(lambda t: [100, 200, 300, 400], boot_s=0.1)
+    async with TcpLine(device, tick_s=0.005) as line:
+        count = 0
+
+        def disturb(item):
+            nonlocal count
+            count += isinstance(item, LoadSample)
+            if count == 3:
+                line.inject(b"\xff999\r\n7")
+            if count == 6:
+                device.power_cycle()
+            if count == 9 and isinstance(item, LoadSample):
+                device.silent = True
+            if isinstance(item, DeviceState) and item.state == "silent":
+                device.silent = False
+
+        seen = await until(
+            board(tcp("127.0.0.1", line.port)),
+            lambda seen: count > 9 and "silent" in states(seen) and isinstance(seen[-1], LoadSample),
+            disturb,
+        )
+        assert states(seen) == ["connected", "silent", "connected"]
+        for sample in samples(seen):
+            assert all(math.isnan(v) or v == w for v, w in zip(sample.values, (100, 200, 300, 400), strict=True))

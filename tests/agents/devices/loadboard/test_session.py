@@ -1,0 +1,150 @@
+"""The board's session against its emulator, bytes and time in the test's hand: which cell a number is given to."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
+
+#: Every cell has values that no other cell has, so that a mix-up shows.
+CELLS = (1000, 2000, 3000, 4000)
+
+
+class Wire:
+    """A session and a board on one wire; ``run`` moves time on in steps of a millisecond."""
+
+    def __init__(self, device_options=None, **options) -> None:
+        self.now = 0.0
+
+        def clock():
+            return self.now
+
+        def counts(t):
+            return [value + int(t * 50) % 900 for value in CELLS]
+
+        self.device = RosTmsBoardDevice(counts, boot_s=0.05, clock=clock, **(device_options or {}))
+        self.session = RosTmsBoardSession(clock=clock, **options)
+        self.session.opened()
+        self.noise = b""
+
+    def run(self, seconds: float, latency_s=lambda: 0.0) -> list:
+        samples = []
+        for _ in range(round(seconds * 1000)):
+            self.now += 0.001
+            self.device.delay_s = latency_s()
+            arrived = self.device.receive(self.session.output()) + self.device.tick() + self.noise
+            self.noise = b""
+            if arrived:
+                samples += self.session.receive(arrived)
+            self.session.tick()
+        return samples
+
+
+def right(samples) -> bool:
+    return all(
+        math.isnan(value) or base <= value < base + 900
+        for sample in samples
+        for value, base in zip(sample.values, CELLS, strict=True)
+    )
+
+
+@pytest.mark.parametrize("firmware", ["plain", "quoted", "ok", "ok-line"])
+def test_every_firmware_is_read_fifty_times_a_second(firmware):
+    samples = Wire({"firmware": firmware}).run(1.0)
+    assert 40 <= len(samples) <= 50 and right(samples)
+    assert not any(math.isnan(value) for sample in samples for value in sample.values)
+    assert all(sample.fault == "" and sample.stable is None for sample in samples)
+
+
+def test_a_late_answer_is_never_given_to_another_cell():
+    wire = Wire(reply_s=0.02, late_s=0.06)
+    rng = random.Random(4)
+    samples = wire.run(20.0, lambda: rng.choice([0.0, 0.0, 0.0, 0.001, 0.03, 0.05]))
+    assert len(samples) > 20 and right(samples)
+    assert any(math.isnan(value) for sample in samples for value in sample.values)
+
+
+def test_an_answer_too_late_even_for_the_pause_spoils_its_round_only():
+    """The late line shifts the following answers by one cell; the line left over at the end gives it away."""
+    wire = Wire(reply_s=0.02, late_s=0.04)
+    wire.run(0.3, lambda: 0.002)
+    wire.device.delay_s = 0.0
+    hold = iter([0.075])
+    samples = wire.run(0.5, lambda: next(hold, 0.002) if wire.session._asked == 1 else 0.002)
+    assert right(samples) and samples
+    assert wire.session.doubtful_rounds >= 1
+
+
+def test_garbage_half_lines_and_power_cycles_cost_values_not_their_order():
+    wire = Wire()
+    good = len(wire.run(0.5))
+    for fault in ("garble_next", "cut_next"):
+        setattr(wire.device, fault, 2)
+        samples = wire.run(2.0)
+        assert right(samples) and any(math.isnan(value) for sample in samples for value in sample.values)
+        assert not any(map(math.isnan, samples[-1].values))
+    wire.noise = b"17\r\n1234"
+    assert right(wire.run(0.5))
+    wire.device.power_cycle()
+    samples = wire.run(2.0)
+    assert right(samples) and len(wire.run(0.5)) >= good - 5
+
+
+def test_a_deaf_cell_is_named_and_does_not_slow_down_the_others():
+    wire = Wire(retry_s=1.0)
+    wire.device.deaf = {2}
+    wire.run(1.0)
+    samples = wire.run(4.0)
+    assert len(samples) > 100 and right(samples)
+    assert all(math.isnan(sample.values[2]) and sample.fault == "no answer from cell 2" for sample in samples)
+    assert not any(math.isnan(sample.values[k]) for sample in samples for k in (0, 1, 3))
+    wire.device.deaf = set()
+    assert wire.run(2.0)[-1].fault == ""
+
+
+def test_a_silent_board_gives_no_sign_of_life():
+    wire = Wire()
+    wire.run(0.2)
+    frames = wire.session.frames
+    wire.device.silent = True
+    assert len(wire.run(3.0)) <= 1 and wire.session.frames == frames
+    wire.device.silent = False
+    assert wire.run(1.5)
+
+
+def test_a_stuck_cell_is_reported_as_it_is():
+    wire = Wire()
+    wire.device.stuck = {1: 2222}
+    assert {sample.values[1] for sample in wire.run(1.0)} == {2222.0}
+
+
+def test_a_board_has_at_least_one_cell_and_an_index_for_each():
+    with pytest.raises(ValueError, match="1 to 36 cells"):
+        RosTmsBoardSession(cells=37)
+    with pytest.raises(ValueError, match="1 to 36 cells"):
+        RosTmsBoardSession(cells=0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["data", "wait"]), st.binary(max_size=80), st.floats(0, 0.2)),
+        max_size=30,
+    )
+)
+def test_any_bytes_are_survived_in_bounded_memory(steps):
+    now = 0.0
+    session = RosTmsBoardSession(clock=lambda: now)
+    session.opened()
+    for what, data, seconds in steps:
+        if what == "data":
+            assert all(len(sample.values) == 4 for sample in session.receive(data))
+        now += seconds
+        session.tick()
+        assert len(session.output()) <= 1 and session.pending <= 200
