@@ -1,0 +1,91 @@
+"""From samples to block means, without the samples of cells that cannot be believed.
+
+A cell is unusable while it delivers NaN, is overloaded, or repeats one value for longer than its noise makes credible
+(a stuck cell; all cells at once: a board without power). While any cell is unusable there are no blocks: a centre of
+gravity needs every cell, and a load that changed meanwhile is found against the old resting level afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.settings import EstimatorSettings
+
+#: Probability that a cell repeats its last value: where learning begins, and its limits.
+_REPEAT_START, _REPEAT_LEAST, _REPEAT_MOST = 0.5, 0.15, 0.999
+
+
+@dataclass(slots=True)
+class Block:
+    """Mean of ``n`` consecutive samples from ``start`` to ``end`` (s); the noise stage fills in the ``variance`` of it."""
+
+    start: float
+    end: float
+    n: int
+    mean: Array
+    variance: Array
+
+
+class Blocks:
+    """Collects samples; ``unusable`` names the cells (by index) that now stop the flow of blocks."""
+
+    def __init__(self, cells: int, settings: EstimatorSettings) -> None:
+        self.unusable: tuple[int, ...] = ()
+        self._settings, self._cells = settings, cells
+        self._samples: list[list[float]] = []
+        self._start = 0.0
+        self._before: deque[list[float]] = deque(maxlen=2)
+        self._last = [math.nan] * cells
+        self._run = [0] * cells
+        self._repeat = [_REPEAT_START] * cells
+
+    def push(self, t: float, grams: Array) -> tuple[Block, Array] | None:
+        """Take one sample (k,); a finished block, and its samples (n + 2, k) with the two before them."""
+        values = grams.tolist()
+        self.unusable = self._check(values)
+        if self.unusable:
+            self._samples.clear()
+            self._before.clear()
+            return None
+        if not self._samples:
+            self._start = t
+        self._samples.append(values)
+        # Half a period early, so that jitter of the sampling does not make every second block one sample longer.
+        period = (t - self._start) / max(len(self._samples) - 1, 1)
+        if t - self._start + 1.5 * period < self._settings.block_s and t >= self._start:
+            return None
+        samples = np.array([*self._before, *self._samples])
+        block = Block(self._start, t, len(self._samples), np.mean(samples[-len(self._samples) :], axis=0), np.empty(0))
+        self._before.extend(self._samples[-2:])
+        self._samples.clear()
+        return block, samples
+
+    def _check(self, values: list[float]) -> tuple[int, ...]:
+        if len(values) != self._cells:
+            raise ValueError(f"{len(values)} values for {self._cells} cells")
+        settings, bad = self._settings, []
+        patience = -math.log(settings.stuck_probability)
+        together, shortest = 0.0, 1 << 30
+        for i, value in enumerate(values):
+            if not math.isfinite(value) or abs(value) > settings.cell_limit_g:
+                bad.append(i)
+                self._run[i] = 0
+                self._last[i] = math.nan
+                shortest = 0
+                continue
+            run = self._run[i] = self._run[i] + 1 if value == self._last[i] else 0
+            self._last[i] = value
+            surprise = -math.log(min(max(self._repeat[i], _REPEAT_LEAST), _REPEAT_MOST))
+            together, shortest = together + surprise, min(shortest, run)
+            if run * surprise > patience:
+                bad.append(i)
+            elif run * surprise < 0.5 * patience:  # a cell that is perhaps stuck teaches nothing about its noise
+                self._repeat[i] += 0.003 * ((run > 0) - self._repeat[i])
+        if shortest * together > patience:
+            return tuple(range(self._cells))
+        return tuple(bad)

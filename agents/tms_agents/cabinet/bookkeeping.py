@@ -1,0 +1,104 @@
+"""From an explanation of a step to the things on the board, and to events; and better estimates while a load rests.
+
+A thing that is lifted has vanished: its stay is over, also when its tag stays in view and it is put down again; that is
+a new stay, which the tag and the weight identify. ``Moved`` is for a thing that never left the board: slid, put down
+so quickly that the board was never steady without it, or simply known better than when it appeared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished
+from tms_agents.cabinet.fusion import Explanation
+from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.stays import Shelf, Thing
+from tms_agents.cabinet.steps import Step
+
+
+@dataclass(slots=True)
+class Settling:
+    """The thing put last: its load is the resting level minus ``before`` (k,), better the longer the load rests."""
+
+    thing: Thing
+    before: Array
+    variance: Array
+    posted: float
+    looked: bool = False
+
+
+class Bookkeeper:
+    """Applies explanations to the shelf."""
+
+    def __init__(self, shelf: Shelf, settings: EstimatorSettings) -> None:
+        self._shelf, self._settings = shelf, settings
+        self.settling: Settling | None = None
+
+    def apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
+        """Do to the shelf what ``explanation`` says about ``step``."""
+        events: list[CabinetEvent] = []
+        settling, self.settling = self.settling, None
+        gone, gone_variance = np.zeros_like(step.change), np.zeros_like(step.change)
+        for thing in explanation.removed:
+            events.append(self._remove(thing, step, alone=explanation.kind == "take" and len(explanation.removed) == 1))
+            gone, gone_variance = gone + thing.load, gone_variance + thing.variance
+        if explanation.kind in ("put", "swap"):
+            assert explanation.load is not None
+            variance = step.variance + gone_variance
+            thing = self._shelf.put(explanation.load, variance, since=step.settled, onset=step.onset)
+            at = thing.centre(self._shelf.geometry)
+            thing.told = at.xy
+            events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
+            before_variance = step.before_variance + gone_variance
+            self.settling = Settling(thing, step.before - gone, before_variance, step.now)
+        elif explanation.kind in ("slide", "adjust"):
+            assert explanation.thing is not None and explanation.load is not None
+            thing = explanation.thing
+            thing.load, thing.variance = explanation.load, thing.variance + step.variance
+            if settling is not None and settling.thing is thing and explanation.kind == "adjust":
+                thing.variance = step.variance - step.before_variance + settling.variance
+                self.settling = Settling(thing, settling.before, settling.variance, step.now)
+            events += self._tell(thing, step.now, always=explanation.kind == "slide")
+        return events
+
+    def _remove(self, thing: Thing, step: Step, *, alone: bool) -> Vanished:
+        del self._shelf.things[thing.id]
+        partners = [self._shelf.things[i] for i in thing.joint if i in self._shelf.things]
+        if alone and partners:
+            # The sum of things that came together is known: what this one weighed less, the others weigh more.
+            rest = (step.change + thing.load) / len(partners)
+            for partner in partners:
+                partner.load = partner.load + rest
+                partner.joint = partner.joint - {thing.id}
+                if len(partners) == 1:
+                    partner.variance, partner.joint = step.variance * 2, frozenset()
+        if alone:
+            return Vanished(step.now, thing.id, -step.weight_g, float(np.sqrt(step.variance.sum())))
+        at = thing.centre(self._shelf.geometry)
+        return Vanished(step.now, thing.id, at.weight_g, at.weight_sd_g)
+
+    def rest(self, now: float, level: Array, variance: Array) -> list[CabinetEvent]:
+        """The load rests at ``level``: sharpen the thing that was put last."""
+        settling = self.settling
+        if settling is None or now - settling.posted > self._settings.refine_until_s:
+            return []
+        thing = settling.thing
+        thing.load, thing.variance = level - settling.before, variance + settling.variance
+        if settling.looked or now - settling.posted < self._settings.refine_after_s:
+            return []
+        settling.looked = True
+        return self._tell(thing, now)
+
+    def _tell(self, thing: Thing, now: float, *, always: bool = False) -> list[CabinetEvent]:
+        at = thing.centre(self._shelf.geometry)
+        offset = np.subtract(at.xy, thing.told)
+        far = float(np.hypot(*offset)) > self._settings.refine_m
+        cov = np.array([[at.cov[0], at.cov[1]], [at.cov[1], at.cov[2]]]) + 1e-8 * np.eye(2)
+        sure = float(offset @ np.linalg.solve(cov, offset)) > self._settings.refine_sd**2
+        if not (always or (far and sure)):
+            return []
+        thing.told = at.xy
+        return [Moved(now, thing.id, at.xy, at.cov)]

@@ -1,0 +1,213 @@
+"""The smart cabinet's estimator: samples of load cells and inventory rounds in, events out. Pure; no clock, no I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+
+from tms_agents.cabinet.blocks import Blocks
+from tms_agents.cabinet.bookkeeping import Bookkeeper
+from tms_agents.cabinet.events import CabinetEvent, Stay
+from tms_agents.cabinet.fusion import Evidence, Explanation, explain
+from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
+from tms_agents.cabinet.naming import Namer
+from tms_agents.cabinet.noise import Noise
+from tms_agents.cabinet.presence import Presence
+from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.stays import Shelf, Thing
+from tms_agents.cabinet.steps import Step, StepDetector
+
+
+class CabinetEstimator:
+    """One board on load cells with its antenna zones; frame of ``geometry`` in metres, grams, seconds.
+
+    Times must not go back; each method returns what follows from its input, in the order in which it happened.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        settings: EstimatorSettings | None = None,
+        known: Mapping[str, KnownWeight] | None = None,
+        *,
+        zones: Mapping[str, Zone],
+    ) -> None:
+        self._geometry, self._settings = geometry, settings or EstimatorSettings()
+        self._zones = dict(zones)
+        self._blocks = Blocks(geometry.count, self._settings)
+        self._noise = Noise(geometry.count, self._settings)
+        self._detector = StepDetector(geometry.count, self._settings)
+        self._shelf = Shelf(geometry)
+        self._presence = Presence(self._settings)
+        self._known = dict(known or {})
+        self._connect()
+        self._interrupted: float | None = None
+        self._looked = -math.inf
+
+    def _connect(self) -> None:
+        self._book = Bookkeeper(self._shelf, self._settings)
+        self._namer = Namer(self._shelf, self._presence, self._zones, self._known, self._settings)
+
+    # --- input
+
+    def load(self, t: float, grams: Array) -> list[CabinetEvent]:
+        """Take one sample: calibrated grams per cell, (k,); NaN where a cell is unusable now.
+
+        Raises:
+            ValueError: another number of cells than the geometry has.
+        """
+        done = self._blocks.push(t, grams)
+        if self._blocks.unusable:
+            if self._interrupted is None:
+                self._interrupted = t
+                self._detector.interrupt()
+                self._noise.interrupt()
+            return []
+        if done is None:
+            return []
+        block, samples = done
+        self._noise.learn(block, samples)
+        if self._interrupted is not None:
+            self._drifted(block.start - self._interrupted)
+            self._interrupted = None
+        step = self._detector.push(block)
+        if step is not None:
+            return self._explain(step)
+        if self._detector.resting and t - self._looked > 0.5 and self._book.settling is not None:
+            self._looked = t
+            level, variance, _ = self._detector.resting_level()
+            return self._book.rest(t, level, variance)
+        return []
+
+    def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[CabinetEvent]:
+        """Take one completed round of one antenna zone; an empty set means that nothing was read.
+
+        Raises:
+            ValueError: a zone that was not configured.
+        """
+        if zone not in self._zones:
+            raise ValueError(f"there is no zone {zone!r}")
+        self._presence.see(t, zone, tags)
+        return self._namer.update(t)
+
+    def know(self, tag: str, weight: KnownWeight) -> None:
+        """What the object with this tag weighs, from the object database."""
+        self._namer.known[tag] = weight
+
+    # --- state
+
+    def stays(self) -> list[Stay]:
+        """Everything on the board now, oldest first."""
+        return self._shelf.stays()
+
+    @property
+    def unusable_cells(self) -> tuple[int, ...]:
+        """Indices of the cells that are NaN, overloaded or stuck now; while there are any, the load is not judged."""
+        return self._blocks.unusable
+
+    @property
+    def noise_sd_g(self) -> Array:
+        """Standard deviation of a single sample of each cell at the moment, (k,) g; NaN until it is known."""
+        return self._noise.sd_g
+
+    @property
+    def zero_g(self) -> Array:
+        """What the cells show without the things on the board, (k,) g: drift and creep so far."""
+        return self._detector.level.mean - self._shelf.total()
+
+    @property
+    def resting(self) -> bool:
+        """Whether the load is steady and everything about it told."""
+        return self._detector.resting and not self._blocks.unusable
+
+    # --- a step of the load
+
+    def _explain(self, step: Step) -> list[CabinetEvent]:
+        final = self._detector.is_final(step)
+        patient = not final and step.now - step.settled < self._settings.patience_s
+        best = explain(step, self._shelf, self._evidence(step), self._settings)[0]
+        if best.kind == "unknown":
+            if patient:
+                self._detector.hold(step)
+            elif final:
+                self._detector.ignore(step)
+            else:
+                self._detector.accept(step)
+            return []
+        if best.score < 0.9 and patient:
+            self._detector.hold(step)
+            return []
+        return self._take(step, best)
+
+    def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
+        for thing in explanation.removed:
+            at = thing.centre(self._geometry)
+            self._namer.left(thing, at.weight_g, at.weight_sd_g)
+        events = self._book.apply(step, explanation)
+        self._detector.accept(step)
+        return events + self._namer.update(step.now)
+
+    def _evidence(self, step: Step) -> Evidence:
+        settling = self._book.settling
+
+        def taken(thing: Thing) -> float:
+            return 0.0 if thing.tag is None else self._presence.taken(thing.tag, step.settled)
+
+        if settling is None:
+            return Evidence(taken, self._namer.loose_weights())
+        gap = max(step.onset - settling.posted, 0.0)
+        return Evidence(taken, self._namer.loose_weights(), settling.thing, math.exp(-gap / 0.7))
+
+    def _drifted(self, seconds: float) -> None:
+        rate = self._settings.creep_per_hour * (np.abs(self._shelf.total()) + 500.0)
+        self._detector.level.loosen((rate * max(seconds, 0.0) / 3600.0) ** 2)
+
+    # --- across restarts
+
+    def to_dict(self) -> dict[str, Any]:
+        """State that survives a restart of the agent, as JSON values: stays, resting level, noise, learned weights."""
+        noise = self._noise.variance
+        return {
+            "format": 1,
+            "shelf": self._shelf.to_dict(),
+            "level": self._detector.level.mean.tolist() if self._detector.level.known else None,
+            "noise": None if np.isnan(noise).any() else noise.tolist(),
+            "learned": {tag: [w.mean_g, w.sd_g] for tag, w in self._namer.learned.items()},
+        }
+
+    @classmethod
+    def from_dict(
+        cls,
+        state: Mapping[str, Any],
+        geometry: Geometry,
+        settings: EstimatorSettings | None = None,
+        known: Mapping[str, KnownWeight] | None = None,
+        *,
+        zones: Mapping[str, Zone],
+    ) -> Self:
+        """Go on from a saved state: the load is compared with what it was then.
+
+        Raises:
+            ValueError: the state is of another format or of a board with other cells.
+        """
+        if state.get("format") != 1:
+            raise ValueError("the saved state of the estimator has a format that this version does not know")
+        try:
+            self = cls(geometry, settings, known, zones=zones)
+            self._shelf = Shelf.from_dict(geometry, state["shelf"])
+            self._connect()
+            self._namer.learned = {tag: KnownWeight(*pair) for tag, pair in state["learned"].items()}
+            if state["noise"] is not None:
+                self._noise.variance = np.array(state["noise"], dtype=float)
+            if state["level"] is not None:
+                level = np.array(state["level"], dtype=float)
+                # Drift of some hours without power.
+                rate = 3 * self._settings.creep_per_hour * (np.abs(self._shelf.total()) + 500.0)
+                self._detector.level.set(level, rate**2 + 1.0)
+                self._detector.interrupt()
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"the saved state of the estimator is damaged: {error}") from None
+        return self

@@ -1,0 +1,92 @@
+"""Tags to stays: identified where the evidence is clear, told as read in the zone where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tms_agents.cabinet.events import CabinetEvent, Identified, ZoneRead
+from tms_agents.cabinet.geometry import KnownWeight, Zone
+from tms_agents.cabinet.identify import assign
+from tms_agents.cabinet.presence import Presence
+from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.stays import Shelf, Thing
+
+#: Weights of that many objects are remembered from their stays.
+_LEARNED_KEPT = 5000
+
+
+class Namer:
+    """Keeps which present tags are loose, and since when."""
+
+    def __init__(
+        self,
+        shelf: Shelf,
+        presence: Presence,
+        zones: Mapping[str, Zone],
+        known: Mapping[str, KnownWeight],
+        settings: EstimatorSettings,
+    ) -> None:
+        self._shelf, self._presence, self._zones, self._settings = shelf, presence, zones, settings
+        self.known: dict[str, KnownWeight] = dict(known)
+        self.learned: dict[str, KnownWeight] = {}
+        self._loose: dict[str, float] = {}
+        self._told: dict[tuple[str, str], float] = {}
+
+    def weight(self, tag: str) -> KnownWeight | None:
+        """What the object weighed when it was here last, else what the database says."""
+        return self.learned.get(tag) or self.known.get(tag)
+
+    def loose_weights(self) -> list[KnownWeight]:
+        """Known weights of the present tags that are at no stay: what may be put next."""
+        return [weight for tag in self._loose if (weight := self.weight(tag)) is not None]
+
+    def update(self, now: float) -> list[CabinetEvent]:
+        """Look at tags and stays together; called after every round and every event of the load."""
+        present = self._presence.present()
+        pinned = {thing.tag for thing in self._shelf.things.values() if thing.tag is not None}
+        loose = {tag: zones for tag, zones in present.items() if tag not in pinned}
+        self._loose = {tag: self._loose.get(tag, now) for tag in loose}
+        events: list[CabinetEvent] = []
+        open_things = [thing for thing in self._shelf.things.values() if thing.tag is None]
+        if open_things and loose:
+            weights = {tag: weight for tag in loose if (weight := self.weight(tag)) is not None}
+            chances = assign(
+                open_things, loose, weights, self._presence, self._zones, self._shelf.geometry, self._settings
+            )
+            for (stay, tag), chance in chances.items():
+                if chance >= 1 - self._settings.doubt:
+                    events.append(self.pin(now, self._shelf.things[stay], tag))
+                    del loose[tag], self._loose[tag]
+        return events + self._zone_reads(now, loose)
+
+    def pin(self, now: float, thing: Thing, tag: str) -> Identified:
+        thing.tag = tag
+        weight, at = self.weight(tag), thing.centre(self._shelf.geometry)
+        # A weight that does not fit is out of date.
+        if weight is not None and abs(at.weight_g - weight.mean_g) < 4 * (at.weight_sd_g + weight.sd_g) + 1.0:
+            thing.known = weight
+        return Identified(now, thing.id, tag)
+
+    def left(self, thing: Thing, weight_g: float, sd_g: float) -> None:
+        """A thing was lifted: remember what it weighed."""
+        if thing.tag is not None:
+            self.learned.pop(thing.tag, None)
+            self.learned[thing.tag] = KnownWeight(weight_g, sd_g + 0.005 * abs(weight_g))
+            while len(self.learned) > _LEARNED_KEPT:
+                del self.learned[next(iter(self.learned))]
+
+    def _zone_reads(self, now: float, loose: Mapping[str, Mapping[str, object]]) -> list[CabinetEvent]:
+        events: list[CabinetEvent] = []
+        for tag, zones in loose.items():
+            if now - self._loose[tag] < self._settings.zone_read_after_s:
+                continue
+            for zone in zones:
+                if (zone, tag) not in self._told:
+                    self._told[zone, tag] = now
+                    events.append(ZoneRead(now, zone, tag))
+        over = [(zone, tag) for zone, tag in self._told if zone not in loose.get(tag, {})]
+        for zone, tag in over:
+            del self._told[zone, tag]
+            if not self._presence.is_present(tag) and not any(z == zone for z, _ in self._told):
+                events.append(ZoneRead(now, zone, None))
+        return events

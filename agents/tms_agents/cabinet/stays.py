@@ -1,0 +1,110 @@
+"""The things on the board: each keeps its own load vector, and position and weight follow from that alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tms_agents.cabinet.events import Stay
+from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
+from tms_agents.cabinet.position import Centre, centre
+
+
+@dataclass(slots=True, eq=False)
+class Thing:
+    """``load`` (k,) g is what it adds to each cell, with independent errors of ``variance`` (k,) g^2."""
+
+    id: int
+    load: Array
+    variance: Array
+    since: float
+    #: When the change began that brought it.
+    onset: float
+    tag: str | None = None
+    #: What it weighs by itself, known from its tag.
+    known: KnownWeight | None = None
+    #: Ids of the things that came in the same step: only the sum of their loads is known.
+    joint: frozenset[int] = frozenset()
+    #: Position last told.
+    told: tuple[float, float] = (0.0, 0.0)
+
+    def centre(self, geometry: Geometry) -> Centre:
+        return centre(self.load, self.variance, geometry, None if self.joint else self.known)
+
+    def at(self, now: float, creep_per_hour: float) -> Array:
+        """Variance of the load it would take away ``now``: creep has changed it since."""
+        hours = max(now - self.since, 0.0) / 3600.0
+        # Small things that never matter for resting loads: hysteresis, and the edge on which a thing is lifted.
+        share = creep_per_hour * hours + 0.004
+        return self.variance + (share * np.abs(self.load)) ** 2
+
+
+@dataclass(slots=True)
+class Shelf:
+    """All things on the board, by id; ids are never used again."""
+
+    geometry: Geometry
+    things: dict[int, Thing] = field(default_factory=dict)
+    next_id: int = 1
+
+    def put(self, load: Array, variance: Array, since: float, onset: float) -> Thing:
+        thing = Thing(self.next_id, load, variance, since, onset)
+        self.next_id += 1
+        self.things[thing.id] = thing
+        return thing
+
+    def tagged(self, tag: str) -> Thing | None:
+        return next((thing for thing in self.things.values() if thing.tag == tag), None)
+
+    def stays(self) -> list[Stay]:
+        return [self._stay(thing) for thing in self.things.values()]
+
+    def total(self) -> Array:
+        """Sum of all loads, (k,) g: what the cells show above their zero."""
+        return sum((thing.load for thing in self.things.values()), np.zeros(self.geometry.count))
+
+    def _stay(self, thing: Thing) -> Stay:
+        at = thing.centre(self.geometry)
+        return Stay(thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g, thing.tag, thing.since)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "next_id": self.next_id,
+            "things": [
+                {
+                    "id": thing.id,
+                    "load": thing.load.tolist(),
+                    "variance": thing.variance.tolist(),
+                    "since": thing.since,
+                    "onset": thing.onset,
+                    "tag": thing.tag,
+                    "known": None if thing.known is None else [thing.known.mean_g, thing.known.sd_g],
+                    "joint": sorted(thing.joint),
+                    "told": list(thing.told),
+                }
+                for thing in self.things.values()
+            ],
+        }
+
+    @classmethod
+    def from_dict(cls, geometry: Geometry, state: dict[str, Any]) -> Shelf:
+        shelf = cls(geometry, next_id=int(state["next_id"]))
+        for item in state["things"]:
+            load, variance = np.array(item["load"], dtype=float), np.array(item["variance"], dtype=float)
+            if load.shape != (geometry.count,) or variance.shape != load.shape or not math.isfinite(load.sum()):
+                raise ValueError(f"stay {item['id']} was saved for a board with other cells")
+            shelf.things[int(item["id"])] = Thing(
+                id=int(item["id"]),
+                load=load,
+                variance=variance,
+                since=float(item["since"]),
+                onset=float(item["onset"]),
+                tag=item["tag"],
+                known=None if item["known"] is None else KnownWeight(*item["known"]),
+                joint=frozenset(item["joint"]),
+                told=(float(item["told"][0]), float(item["told"][1])),
+            )
+        return shelf

@@ -1,0 +1,109 @@
+"""The estimator on hand-written signals: what a person does at a board, and what must come out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tms_agents.cabinet import (
+    Appeared,
+    CabinetEstimator,
+    CabinetEvent,
+    Geometry,
+    Identified,
+    KnownWeight,
+    Vanished,
+    Zone,
+)
+
+CELLS = ((0.04, 0.047), (0.425, 0.047), (0.04, 0.27), (0.425, 0.27))
+GEOMETRY = Geometry(CELLS, 0.465, 0.317)
+ZONES = {"shelf": Zone("shelf")}
+
+
+def share(x: float, y: float) -> np.ndarray:
+    """What a rigid board gives to each cell of a gram at (x, y); the centre of gravity is (x, y) exactly."""
+    across, along = (x - 0.04) / 0.385, (y - 0.047) / 0.223
+    return np.array([(1 - across) * (1 - along), across * (1 - along), (1 - across) * along, across * along])
+
+
+class Bench:
+    """A board whose load is whatever a function of time says, sampled at 50 Hz with noise and steps of 5 g."""
+
+    def __init__(self, seed: int = 0, known: dict[str, KnownWeight] | None = None) -> None:
+        self.estimator = CabinetEstimator(GEOMETRY, known=known or {}, zones=ZONES)
+        self.rng = np.random.default_rng(seed)
+        self.t = 0.0
+        self.load = np.zeros(4)
+        self.tags: frozenset[str] = frozenset()
+        self.sd = 8.0
+        self.events: list[CabinetEvent] = []
+        self.run(4.0)
+
+    def run(self, seconds: float, extra: Callable[[float], np.ndarray] = lambda s: np.zeros(4)) -> list[CabinetEvent]:
+        """Go on for so long, ``extra`` grams (of seconds from now) on top of the load; returns the new events."""
+        begin, before = self.t, len(self.events)
+        for i in range(round(seconds * 50)):
+            self.t = begin + 0.02 * i
+            grams = self.load + extra(self.t - begin) + self.rng.normal(0.0, self.sd, 4)
+            self.events += self.estimator.load(self.t, np.round(grams / 5) * 5)
+            if i % 10 == 5:
+                read = {tag for tag in self.tags if self.rng.random() < 0.95}
+                self.events += self.estimator.inventory(self.t, "shelf", frozenset(read))
+        self.t = begin + seconds
+        return self.events[before:]
+
+    def change(self, load: np.ndarray, seconds: float = 0.2, rest: float = 3.0) -> list[CabinetEvent]:
+        """Add ``load`` within ``seconds``, then rest."""
+        events = self.run(seconds, lambda s: load * s / seconds)
+        self.load = self.load + load
+        return events + self.run(rest)
+
+
+def of(kind: type, events: list[CabinetEvent]) -> list:
+    return [event for event in events if isinstance(event, kind)]
+
+
+@pytest.mark.parametrize("grams", [25, 60, 300, 2000])
+def test_put_and_taken(grams: float) -> None:
+    bench = Bench()
+    thing = grams * share(0.3, 0.1)
+    put = bench.change(thing)
+    (appeared,) = of(Appeared, put)
+    assert abs(appeared.weight_g - grams) < 4 * appeared.weight_sd_g
+    assert np.hypot(appeared.xy[0] - 0.3, appeared.xy[1] - 0.1) < 4 * np.sqrt(appeared.cov[0] + appeared.cov[2])
+    (stay,) = bench.estimator.stays()
+    assert stay.id == appeared.stay
+    (vanished,) = of(Vanished, bench.change(-thing))
+    assert vanished.stay == appeared.stay
+    assert bench.estimator.stays() == []
+    assert of(Appeared, bench.change(thing))[0].stay != appeared.stay, "ids are never used again"
+
+
+def test_nothing_happens() -> None:
+    bench = Bench(seed=3)
+    assert bench.run(120.0) == []
+
+
+def test_a_tag_is_identified_and_one_missed_read_is_no_take() -> None:
+    bench = Bench(seed=4)
+    bench.tags = frozenset({"T1"})
+    (identified,) = of(Identified, bench.change(400 * share(0.1, 0.2)))
+    assert identified.tag == "T1"
+    assert bench.run(60.0) == []
+    assert [stay.tag for stay in bench.estimator.stays()] == ["T1"]
+
+
+def test_state_survives_a_restart() -> None:
+    bench = Bench(seed=5)
+    bench.change(400 * share(0.1, 0.2))
+    saved = json.loads(json.dumps(bench.estimator.to_dict()))
+    before = bench.estimator.stays()
+    bench.estimator = CabinetEstimator.from_dict(saved, GEOMETRY, zones=ZONES)
+    assert bench.run(3.0) == []
+    assert bench.estimator.stays() == before
+    (vanished,) = of(Vanished, bench.change(-400 * share(0.1, 0.2)))
+    assert vanished.stay == before[0].id
