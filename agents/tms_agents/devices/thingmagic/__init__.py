@@ -1,0 +1,1 @@
+"""ThingMagic M5e and M6e modules: UHF Gen2 tags, over a serial line."""
