@@ -8,7 +8,7 @@ from tms_agents.readers.config import (
     Tr3SerialSource,
     Tr3TcpSource,
 )
-from tms_agents.readers.opening import Arrival, Seen, open_reader
+from tms_agents.readers.opening import Arrival, Seen, can_pause, open_reader
 
 __all__ = [
     "Arrival",
@@ -19,5 +19,6 @@ __all__ = [
     "Seen",
     "Tr3SerialSource",
     "Tr3TcpSource",
+    "can_pause",
     "open_reader",
 ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from tms_agents.devices.llrp.session import LlrpSession
-from tms_agents.devices.tags import RoundEnd, TagItem, TagRead
+from tms_agents.devices.tags import Field, RoundEnd, TagItem, TagRead
 from tms_agents.devices.tr3.session import Tr3Session
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
 from tms_agents.readers.capture import groups
@@ -29,11 +29,15 @@ Arrival = tuple[datetime, Sequence[Seen | RoundEnd] | DeviceState]
 
 
 async def open_reader(
-    source: ReaderSource, *, silent_after_s: float = 10.0, clock: Callable[[], float] = time.time
+    source: ReaderSource,
+    *,
+    silent_after_s: float = 10.0,
+    field: Field | None = None,
+    clock: Callable[[], float] = time.time,
 ) -> AsyncGenerator[Arrival, None]:
     """Listen to a reader for ever, through every failure of it; a capture ends, and has the times of its recording.
 
-    ``clock`` gives Unix time.
+    ``field`` pauses the antennas of a reader that can (see ``can_pause``). ``clock`` gives Unix time.
 
     Raises:
         CommandError: a capture cannot be read.
@@ -43,7 +47,7 @@ async def open_reader(
             yield at, found if isinstance(found, DeviceState) else [_seen(read, at, own_clock=True) for read in found]
         return
     own_clock = isinstance(source, LlrpSource) and source.reader_clock
-    async for item in _link(source, silent_after_s).listen():
+    async for item in _link(source, silent_after_s, field).listen():
         at = datetime.fromtimestamp(clock(), UTC)
         if isinstance(item, DeviceState):
             yield at, item
@@ -51,7 +55,14 @@ async def open_reader(
             yield at, [one if isinstance(one, RoundEnd) else _seen(one, at, own_clock) for one in item]
 
 
-def _link(source: LlrpSource | Tr3SerialSource | Tr3TcpSource, silent_after_s: float) -> Link[TagItem]:
+def can_pause(source: ReaderSource) -> bool:
+    """Whether the reader switches its field off when asked."""
+    return isinstance(source, Tr3SerialSource | Tr3TcpSource) and source.mode == "inventory"
+
+
+def _link(
+    source: LlrpSource | Tr3SerialSource | Tr3TcpSource, silent_after_s: float, field: Field | None
+) -> Link[TagItem]:
     if isinstance(source, LlrpSource):
         return Link(
             tcp(source.host, source.port),
@@ -65,7 +76,7 @@ def _link(source: LlrpSource | Tr3SerialSource | Tr3TcpSource, silent_after_s: f
         opener, name = tcp(source.host, source.port), f"TR3 {source.host}:{source.port}"
     return Link(
         opener,
-        lambda: Tr3Session(antennas=source.antennas, mode=source.mode, poll_s=source.poll_s),
+        lambda: Tr3Session(antennas=source.antennas, mode=source.mode, poll_s=source.poll_s, field=field),
         name=name,
         silent_after_s=silent_after_s,
         tick_s=min(0.05, source.poll_s / 2),
