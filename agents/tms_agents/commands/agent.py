@@ -31,6 +31,7 @@ def main(argv: Sequence[str]) -> int:
     hand.add_argument(
         "--timeout", type=float, default=60.0, metavar="S", help="with --once: wait this long for the server"
     )
+    _kind(kinds, "cabinet", "smart cabinet: boards with load cells or scales, and tag readers", _cabinet)
     arguments = parser.parse_args(argv)
     done: int = arguments.work(arguments)
     return done
@@ -50,6 +51,19 @@ def _hand(arguments: argparse.Namespace) -> int:
     drain_s = arguments.timeout if arguments.once else _STOP_S
     tally = _run(config, run_hand(config, once=arguments.once, drain_s=drain_s, progress=_progress()))
     return 1 if arguments.once and (tally.waiting or tally.buried or tally.lost) else 0
+
+
+def _cabinet(arguments: argparse.Namespace) -> int:
+    from tms_agents.cabinet.calibration_file import read_calibration
+    from tms_agents.cabinet.config import CabinetConfig
+    from tms_agents.cabinet.runner import require_calibration
+    from tms_agents.cabinet.runner import run as run_cabinet
+
+    config = read_config(arguments.config, CabinetConfig)
+    calibrations = read_calibration(config.calibration_path(arguments.config))
+    require_calibration(config, calibrations)
+    _run(config, run_cabinet(config, calibrations, drain_s=_STOP_S))
+    return 0
 
 
 def _run(config: AgentConfig, work: Coroutine[Any, Any, P]) -> P:

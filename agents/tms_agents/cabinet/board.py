@@ -1,0 +1,124 @@
+"""One board of a cabinet: samples in, events and a state out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tms_agents.cabinet import CabinetEstimator, CabinetEvent, KnownWeight
+from tms_agents.cabinet.calibration_file import BoardCalibration
+from tms_agents.cabinet.config import BoardSection
+from tms_agents.cabinet.continuity import Continuity
+from tms_agents.cabinet.geometry import Zone
+from tms_agents.cabinet.single import single_loads
+from tms_agents.devices.loads import LoadSample
+from tms_agents.devices.transport import DeviceState
+
+log = logging.getLogger(__name__)
+#: A fault is over when the samples were good for so long: states that flicker tell nothing.
+_GOOD_S = 1.0
+#: A filtered device repeats its number at rest. This much, one way and the other, tells that from a stuck cell.
+_DITHER_G = 1e-3
+
+
+class Board:
+    """``calibration`` None: the device delivers grams."""
+
+    def __init__(self, section: BoardSection, calibration: BoardCalibration | None, zones: Mapping[str, Zone]) -> None:
+        self.section, self.calibration, self.zones = section, calibration, dict(zones)
+        self.geometry, self.settings = section.geometry(calibration), section.settings()
+        self.estimator = CabinetEstimator(self.geometry, self.settings, zones=self.zones)
+        self._continuity = Continuity(section.cell_count, zeroes_itself=section.zeroes_itself)
+        self._filtered = all(one.filtered for one in section.load)
+        self._dither = _DITHER_G
+        self._link: DeviceState | None = None
+        self._fault, self._fault_at = "", float("-inf")
+        #: Grams of every cell of the device at the last sample, NaN where unusable.
+        self.grams: NDArray[np.float64] = np.full(section.cell_count, np.nan)
+
+    @property
+    def name(self) -> str:
+        return self.section.name
+
+    @property
+    def state(self) -> DeviceState | None:
+        """The worse of the line's state and what the samples say; None before the line said anything."""
+        if self._link is None:
+            return None
+        if self._link.state == "connected" and self._fault:
+            return DeviceState("faulty", f"{self.name}: {self._fault}")
+        return DeviceState(self._link.state, f"{self.name}: {self._link.why}")
+
+    def line(self, t: float, state: DeviceState) -> None:
+        """The line to the device is in a new state."""
+        if state.state != "connected":
+            self._continuity.interrupted()
+            self.estimator.load(t, np.full(self.geometry.count, np.nan))
+            self.grams = np.full_like(self.grams, np.nan)
+            self._fault = ""
+        self._link = state
+
+    def sample(self, t: float, sample: LoadSample) -> list[CabinetEvent]:
+        """One sample at sensor time ``t``."""
+        values = np.array(sample.values, dtype=float)
+        if len(values) != len(self.grams):
+            self._failing(t, f"{len(values)} values for {len(self.grams)} cells")
+            return []
+        raw = values if self.calibration is None else self.calibration.grams(sample.values)
+        grams = self._continuity.take(t, raw)
+        if grams is None:
+            return []
+        self.grams = grams
+        events = self.estimator.load(t, self._for_estimator(grams))
+        self._judge(t, sample)
+        return events
+
+    def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[CabinetEvent]:
+        return self.estimator.inventory(t, zone, tags) if zone in self.zones else []
+
+    def know(self, tag: str, weight: KnownWeight) -> None:
+        self.estimator.know(tag, weight)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"estimator": self.estimator.to_dict(), "zero": self._continuity.to_dict()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from what a former run saved.
+
+        Raises:
+            ValueError, KeyError, TypeError: it does not fit this board.
+        """
+        estimator = CabinetEstimator.from_dict(saved["estimator"], self.geometry, self.settings, zones=self.zones)
+        self._continuity.restore(saved["zero"]["shift"], saved["zero"]["level"])
+        self.estimator = estimator
+
+    def _for_estimator(self, grams: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self.section.cells is None:
+            grams = single_loads(grams)
+        if self._filtered or self.section.cells is None:
+            self._dither = -self._dither
+            grams = grams + self._dither
+        return grams
+
+    def _judge(self, t: float, sample: LoadSample) -> None:
+        fault = sample.fault
+        if not fault and (bad := self._unusable()):
+            fault = f"cell {', '.join(map(str, bad))} does not measure"
+        if fault:
+            self._failing(t, fault)
+        elif self._fault and t - self._fault_at > _GOOD_S:
+            self._fault = ""
+
+    def _failing(self, t: float, fault: str) -> None:
+        self._fault, self._fault_at = fault, t
+
+    def _unusable(self) -> list[int]:
+        """Cells that deliver nothing or the same number for too long."""
+        bad = set(np.flatnonzero(~np.isfinite(self.grams)).tolist())
+        if not self._filtered and self.section.cells is not None:
+            bad |= set(self.estimator.unusable_cells)
+        return sorted(bad)

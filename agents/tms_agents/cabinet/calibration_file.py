@@ -1,0 +1,144 @@
+"""Calibrations of an agent's boards in one TOML file beside its configuration."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+import tomllib
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AwareDatetime, Field, ValidationError, model_validator
+
+from tms_agents.cabinet.calibration import Solution
+from tms_agents.config import Section
+from tms_client.cli import CommandError
+from tms_schemas.base import Xy
+
+_Values = Annotated[list[float], Field(min_length=1, max_length=36)]
+
+
+class BoardCalibration(Section):
+    """``grams = gain * (counts - offset)`` per cell; ``cells`` in metres where they were measured, too."""
+
+    gain: _Values
+    offset: _Values
+    cells: Annotated[list[Xy], Field(min_length=1, max_length=36)] | None = None
+    noise_g: _Values | None = None
+    rmse_weight_g: float | None = None
+    rmse_position_m: float | None = None
+    measured_at: AwareDatetime | None = None
+
+    @model_validator(mode="after")
+    def _same_cells(self) -> BoardCalibration:
+        lengths = {len(one) for one in (self.gain, self.offset, self.cells, self.noise_g) if one is not None}
+        if len(lengths) != 1:
+            raise ValueError("gain, offset, cells and noise_g must have one value per cell")
+        if not all(self.gain):
+            raise ValueError("a gain of 0 means a cell that weighs nothing")
+        return self
+
+    @classmethod
+    def of(cls, solution: Solution, measured_at: datetime, *, with_cells: bool) -> BoardCalibration:
+        at = [(round(float(x), 5), round(float(y), 5)) for x, y in solution.cells]
+        return cls(
+            gain=_rounded(solution.gain),
+            offset=_rounded(solution.offset),
+            cells=at if with_cells else None,
+            noise_g=_rounded(solution.noise_g),
+            rmse_weight_g=round(solution.rmse_weight_g, 4),
+            rmse_position_m=round(solution.rmse_position_m, 6),
+            measured_at=measured_at,
+        )
+
+    def grams(self, counts: Sequence[float]) -> NDArray[np.float64]:
+        """Shape (k,); NaN stays NaN."""
+        grams: NDArray[np.float64] = (np.array(counts) - np.array(self.offset)) * np.array(self.gain)
+        return grams
+
+
+def read_calibration(path: Path) -> dict[str, BoardCalibration]:
+    """Calibrations by board; none where there is no file.
+
+    Raises:
+        CommandError: the file cannot be read or says something impossible.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise CommandError(f"{path}: {error}") from error
+    found: dict[str, BoardCalibration] = {}
+    for name, values in raw.items():
+        try:
+            found[name] = BoardCalibration.model_validate(values)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            raise CommandError(f"{path}: {'.'.join(map(str, (name, *first['loc'])))}: {first['msg']}") from error
+    return found
+
+
+def write_calibration(path: Path, boards: Mapping[str, BoardCalibration]) -> Path | None:
+    """Replace the file in one step; the former one is kept beside it, as ``.old`` (returned where there was one).
+
+    Raises:
+        CommandError: the folder cannot be written.
+    """
+    text = "# grams = gain * (counts - offset) per cell; written by tms cabinet calibrate\n" + "".join(
+        f"\n[{_quoted(name)}]\n{_table(board)}" for name, board in boards.items()
+    )
+    old = path.with_name(path.name + ".old")
+    try:
+        if path.exists():
+            write_atomically(old, path.read_bytes())
+        else:
+            old = None  # type: ignore[assignment]
+        write_atomically(path, text.encode())
+    except OSError as error:
+        raise CommandError(f"{path}: {error.strerror}") from error
+    return old
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """The whole file or none of it, also through a power cut."""
+    number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(number, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise
+
+
+def _table(board: BoardCalibration) -> str:
+    values = board.model_dump(exclude_none=True)
+    lines = []
+    for name, value in values.items():
+        if isinstance(value, datetime):
+            text = value.isoformat(timespec="seconds")
+        elif isinstance(value, list):
+            text = f"[{', '.join(str(list(one)) if isinstance(one, tuple) else repr(one) for one in value)}]"
+        else:
+            text = repr(value)
+        lines.append(f"{name} = {text}\n")
+    return "".join(lines)
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _rounded(values: NDArray[np.float64]) -> list[float]:
+    """Nine digits: more than any cell has, and readable."""
+    return [float(f"{one:.9g}") for one in values]

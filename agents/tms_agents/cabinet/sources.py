@@ -1,0 +1,120 @@
+"""Sections that say what weighs a board, and how each kind is opened: a load source delivers samples for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from tms_agents.config import Section
+from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loads import LoadSample, LoadSource
+from tms_agents.devices.scales import DIALECTS, DialectName, LoadGroup, Mode, ScaleLineSession
+from tms_agents.devices.transport import Link, Opener, Session, serial, tcp
+from tms_agents.readers import Port
+
+Baud = Annotated[int, Field(ge=300, le=4_000_000)]
+
+
+class _Line(Section):
+    """A serial device (``device``, ``baud``) or the same behind a TCP converter (``host``, ``port``)."""
+
+    device: str | None = None
+    baud: Baud | None = None
+    host: str | None = None
+    port: Port | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> _Line:
+        if (self.device is None) == (self.host is None):
+            raise ValueError("give either device (serial) or host and port (TCP)")
+        if self.host is not None and self.port is None:
+            raise ValueError("host needs port")
+        if self.host is not None and self.baud is not None:
+            raise ValueError("baud belongs to a serial device, not to host")
+        return self
+
+    @property
+    def place(self) -> str:
+        return self.device or f"{self.host}:{self.port}"
+
+    def opener(self, baud: int, *, bits: int = 8, parity: str = "N") -> Opener:
+        if self.device is not None:
+            return serial(self.device, self.baud or baud, bits=bits, parity=parity)
+        assert self.host is not None and self.port is not None
+        return tcp(self.host, self.port)
+
+
+class RosTmsBoard(_Line):
+    """The board of the ROS-TMS laboratory: a character per cell asks, a line with the counts answers."""
+
+    kind: Literal["ros-tms"]
+    cells: Annotated[int, Field(ge=1, le=36)] = 4
+    period_s: Annotated[float, Field(ge=0.005, le=10)] = 0.02
+
+    @property
+    def cell_count(self) -> int:
+        return self.cells
+
+    #: Raw values of the converter: calibrated here, zero and noise as they are.
+    filtered: ClassVar[bool] = False
+    zeroes_itself: ClassVar[bool] = False
+
+    def link(self, silent_after_s: float) -> Link[LoadSample]:
+        return _link(
+            f"board {self.place}",
+            self.opener(115200),
+            lambda: RosTmsBoardSession(cells=self.cells, period_s=self.period_s),
+            silent_after_s,
+            self.period_s / 4,
+        )
+
+
+class Scale(_Line):
+    """A scale that prints lines: one cell, in grams."""
+
+    kind: Literal["openscale", "and", "mt-sics"]
+    #: ``poll`` asks every ``poll_s``, ``stream`` has the scale send by itself.
+    mode: Mode | None = None
+    poll_s: Annotated[float, Field(ge=0.01, le=10)] = 0.1
+    #: 7E1 on a converter that only does 8N1.
+    software_parity: bool = False
+
+    cell_count: ClassVar[int] = 1
+    filtered: ClassVar[bool] = True
+
+    @property
+    def zeroes_itself(self) -> bool:
+        """OpenScale keeps its tare; the others begin at zero with whatever stands on them."""
+        return self.kind != "openscale"
+
+    def link(self, silent_after_s: float) -> Link[LoadSample]:
+        name: DialectName = self.kind
+        dialect = DIALECTS[name]
+        mode = self.mode or ("stream" if name == "openscale" else "poll")
+        bits, parity = (8, "N") if self.software_parity else (dialect.bits, dialect.parity)
+        return _link(
+            f"scale {self.place}",
+            self.opener(dialect.baud, bits=bits, parity=parity),
+            lambda: ScaleLineSession(name, mode=mode, poll_s=self.poll_s, software_parity=self.software_parity),
+            silent_after_s,
+            min(0.05, self.poll_s / 2),
+        )
+
+
+LoadSection = Annotated[RosTmsBoard | Scale, Field(discriminator="kind")]
+
+
+def open_loads(sections: Sequence[RosTmsBoard | Scale], silent_after_s: float) -> LoadSource:
+    """One source for all cells of a board."""
+    links = [one.link(silent_after_s) for one in sections]
+    if len(links) == 1:
+        return links[0]
+    return LoadGroup(links, cells=[one.cell_count for one in sections], stale_s=silent_after_s)
+
+
+def _link(
+    name: str, opener: Opener, session: Callable[[], Session[LoadSample]], silent_after_s: float, tick_s: float
+) -> Link[LoadSample]:
+    return Link(opener, session, name=name, silent_after_s=silent_after_s, tick_s=tick_s)

@@ -1,0 +1,44 @@
+"""What a cabinet agent remembers across restarts: a JSON file beside its spool, replaced in one step."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+from tms_agents.cabinet.calibration_file import write_atomically
+
+log = logging.getLogger(__name__)
+_FORMAT = 1
+
+
+def state_path(spool: Path) -> Path:
+    return spool.with_name(spool.name + ".state.json")
+
+
+def load_state(path: Path, agent: str) -> dict[str, Any]:
+    """What was saved; nothing where there is no file, or one that cannot be used (kept beside it, as ``.broken``)."""
+    try:
+        saved = json.loads(path.read_bytes())
+        if not isinstance(saved, dict) or saved.get("format") != _FORMAT or saved.get("agent") != agent:
+            raise ValueError("it is of another agent or format")
+        return saved
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        log.warning("state %s cannot be used, starting without: %s", path, error)
+        with contextlib.suppress(OSError):
+            path.replace(path.with_name(path.name + ".broken"))
+        return {}
+
+
+def save_state(path: Path, agent: str, state: dict[str, Any]) -> bool:
+    """False where the disk refuses; the agent goes on, an old state is better than none."""
+    try:
+        write_atomically(path, json.dumps({"format": _FORMAT, "agent": agent} | state).encode())
+    except OSError as error:
+        log.warning("state %s: %s", path, error)
+        return False
+    return True

@@ -1,0 +1,88 @@
+"""A cabinet for tests: things on an emulated board behind a real terminal, its configuration, the agent as a process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import numpy as np
+
+from tms_agents.simulation.board_plate import load_shares
+
+WIDTH, DEPTH = 0.465, 0.317
+CELLS = ((0.04, 0.047), (0.425, 0.047), (0.04, 0.27), (0.425, 0.27))
+GAIN, OFFSET = 0.5, (1000, -200, 40, 3000)
+MILK, MUG = "E00401004E17F97A", "E00401508747FFC8"
+
+
+class Shelf:
+    """Things on a board; ``counts`` is what its cells say, with noise of ``noise_g`` per cell."""
+
+    def __init__(self, noise_g: float = 2.0) -> None:
+        self.things: dict[str, tuple[float, float, float]] = {}
+        self.noise_g = noise_g
+        self.zero_g = np.zeros(4)
+        self._shares = load_shares(CELLS)
+        self._random = np.random.default_rng(7)
+
+    def put(self, name: str, grams: float, x: float, y: float) -> None:
+        self.things[name] = (grams, x, y)
+
+    def take(self, name: str) -> None:
+        del self.things[name]
+
+    def grams(self) -> np.ndarray:
+        moments = sum((np.array([w, w * x, w * y]) for w, x, y in self.things.values()), np.zeros(3))
+        return self._shares @ moments
+
+    def total(self, _: float = 0.0) -> float:
+        """What a scale under all of it shows."""
+        return float(self.grams().sum())
+
+    def counts(self, _: float) -> list[float]:
+        noisy = self.grams() + self.zero_g + self._random.normal(0, self.noise_g, 4)
+        return list(noisy / GAIN + OFFSET)
+
+
+def calibration_toml(*boards: str) -> str:
+    return "".join(f'["{board}"]\ngain = {[GAIN] * 4}\noffset = {list(OFFSET)}\n' for board in boards)
+
+
+def config_toml(
+    name: str, url: str, load: str, *, reader: str = "", cells: bool = True, more: str = "", top: str = ""
+) -> str:
+    """A cabinet of one board, at (2, 1) in the room and turned by 90 degrees."""
+    text = f'agent = "{name}-cabinet"\nroom = "{name}"\nsilent_after_s = 0.5\nheartbeat_s = 1.0\n{top}\n'
+    text += f'[server]\nurl = "{url}"\nlinger_s = 0.0\n[spool]\npath = "cabinet.spool"\n'
+    text += f'[[boards]]\nname = "shelf"\nwidth = {WIDTH}\ndepth = {DEPTH}\nload = {load}\n'
+    text += f"cells = {[list(one) for one in CELLS]}\n" if cells else ""
+    text += f'pose = {{x = 2.0, y = 1.0, theta = {math.pi / 2}, z = 0.8}}\nsurface = "cabinet/shelf"\n{more}\n'
+    if reader:
+        text += f'[[readers]]\nzone = "shelf"\nsilent_after_s = 0.5\nsource = {reader}\n'
+        text += '[[zones]]\nname = "shelf"\nboard = "shelf"\n'
+    return text
+
+
+@contextlib.asynccontextmanager
+async def agent(config: Path, log: Path | None = None) -> AsyncIterator[subprocess.Popen[bytes]]:
+    """``tms agent cabinet`` as a process, ended in order."""
+    with (log or config.with_suffix(".log")).open("ab") as output:
+        command = [sys.executable, "-m", "tms_client", "agent", "cabinet", "--config", str(config)]
+        process = subprocess.Popen(command, stdout=output, stderr=output)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.terminate()
+        await asyncio.to_thread(process.wait, 20)
+
+
+async def until(true: Callable[[], bool], timeout_s: float = 20.0) -> None:
+    async with asyncio.timeout(timeout_s):
+        while not await asyncio.to_thread(true):
+            await asyncio.sleep(0.05)
