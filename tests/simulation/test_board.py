@@ -37,6 +37,11 @@ def board(seed: int = 0, *, tags: TagParameters | None = None, **electronics: An
     return BoardWorld(parameters, np.random.default_rng(seed))
 
 
+def moments_of(weight: float, xy: Any) -> Any:
+    x, y = xy
+    return weight * np.array([1, x, y, x * y])
+
+
 # statics
 
 
@@ -45,18 +50,26 @@ def test_the_cells_carry_the_weight_and_their_centre_of_gravity_is_its_place(
     loads: list[tuple[tuple[float, float], float]], seed: int
 ) -> None:
     stiffness = np.random.default_rng(seed).uniform(0.5, 2.0, 4)
-    shares = load_shares(LABORATORY_CELLS, list(stiffness))
-    moments = sum(np.array([w, w * x, w * y]) for (x, y), w in loads)
-    on_cells = shares @ moments
-    assert on_cells.sum() == pytest.approx(moments[0])
-    assert on_cells @ np.array(LABORATORY_CELLS) == pytest.approx(moments[1:])
+    moments = sum(moments_of(w, xy) for xy, w in loads)
+    for torsion in (np.inf, 1.0, 0.0):
+        on_cells = load_shares(LABORATORY_CELLS, list(stiffness), torsion) @ moments
+        assert on_cells.sum() == pytest.approx(moments[0])
+        assert on_cells @ np.array(LABORATORY_CELLS) == pytest.approx(moments[1:3])
 
 
 def test_in_the_middle_equal_springs_share_equally_and_a_corner_load_relieves_the_far_corner() -> None:
     shares = load_shares(LABORATORY_CELLS)
     middle = np.mean(LABORATORY_CELLS, axis=0)
-    assert shares @ [1000, *(1000 * middle)] == pytest.approx([250] * 4)
-    assert shares @ [1000, *(1000 * np.array(LABORATORY_CELLS[0]))] == pytest.approx([750, 250, 250, -250])
+    assert shares @ moments_of(1000, middle) == pytest.approx([250] * 4)
+    assert shares @ moments_of(1000, LABORATORY_CELLS[0]) == pytest.approx([750, 250, 250, -250])
+
+
+def test_a_board_that_twists_freely_gives_all_to_the_corner_and_a_stiff_one_is_like_a_rigid_one() -> None:
+    corner = moments_of(1000, LABORATORY_CELLS[0])
+    assert load_shares(LABORATORY_CELLS, torsion=0.0) @ corner == pytest.approx([1000, 0, 0, 0], abs=1e-6)
+    rigid, stiff, half = (load_shares(LABORATORY_CELLS, torsion=t) @ corner for t in (np.inf, 1e9, 1.0))
+    assert stiff == pytest.approx(rigid, abs=1e-3)
+    assert half == pytest.approx([875, 125, 125, -125])
 
 
 @pytest.mark.parametrize("cells", [[(0, 0), (1, 0)], [(0, 0), (1, 1), (2, 2), (3, 3)], [(0, 0), (0, 0), (1, 0)]])
@@ -174,8 +187,8 @@ def test_hands_begin_and_end_with_the_weight_they_must(
     lifted, off = hands.lift_and_put(10.0, weight, old, new, slow)
     slid = hands.slide(10.0, weight, old, new, slow)
     lean = hands.lean(10.0, old, None, None)
-    nothing = [0.0, 0.0, 0.0]
-    at_old, at_new = ([weight, weight * x, weight * y] for x, y in (old, new))
+    nothing = np.zeros(4)
+    at_old, at_new = (moments_of(weight, xy) for xy in (old, new))
     for trace, first, last in [
         (put, nothing, at_new),
         (take, at_old, nothing),
@@ -292,5 +305,5 @@ def test_a_household_leaves_on_the_board_what_its_changes_say(seed: int) -> None
             elif change.kind != "lean":
                 assert (change.kind == "in") == (change.name not in there)
                 there[change.name] = (change.weight_g, change.xy)
-        moments = sum((np.array([w, w * x, w * y]) for w, (x, y) in there.values()), np.zeros(3))
+        moments = sum((moments_of(w, xy) for w, xy in there.values()), np.zeros(4))
         assert np.abs(episode.recording.counts[-1] * 5 - world.shares @ moments).max() <= 2.5 + 1e-6

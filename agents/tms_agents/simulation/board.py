@@ -32,6 +32,7 @@ class BoardParameters:
 
     cells: tuple[Xy, ...] = LABORATORY_CELLS
     stiffness: tuple[float, ...] | None = None  # of the cells, equal by default
+    torsion: float = math.inf  # stiffness of the board against twisting, relative to that of its cells
     width: float = 0.465
     depth: float = 0.317
     period_s: float = 0.02
@@ -83,7 +84,7 @@ class BoardWorld:
 
     def __init__(self, parameters: BoardParameters, rng: np.random.Generator) -> None:
         self.parameters = parameters
-        self.shares = load_shares(parameters.cells, parameters.stiffness)
+        self.shares = load_shares(parameters.cells, parameters.stiffness, parameters.torsion)
         cells, hands, reader = rng.spawn(3)
         self.electronics = CellBank(parameters.electronics, len(parameters.cells), parameters.period_s, cells)
         self.reader = TagReader(parameters.tags, reader)
@@ -173,13 +174,9 @@ class BoardWorld:
         self._leave_field(thing.tag, trace.end + self._hands.approach())
         return self._noted(_change("out", thing, start, trace.end))
 
-    def move(
-        self, name: str, xy: Xy, *, slide: bool | None = None, slow: bool | None = None, after: float = 0
-    ) -> Change:
-        """Somebody moves a thing on the board: through the air, or along it."""
+    def move(self, name: str, xy: Xy, *, slide: bool = False, slow: bool | None = None, after: float = 0) -> Change:
+        """Somebody moves a thing on the board: through the air, or with ``slide`` along it."""
         thing, start = self._at_rest(name, self.time_s + after), self.time_s + after
-        if slide is None:
-            slide = self._hands.slides()
         lifted = None
         if slide:
             trace = self._hands.slide(start, thing.weight_g, thing.xy, xy, slow)
@@ -201,7 +198,7 @@ class BoardWorld:
 
     def loads(self, t: Floats) -> Floats:
         """True load (n, k) of each cell at times (n,) from now on."""
-        moments = np.zeros((len(t), 3))
+        moments = np.zeros((len(t), 4))
         for trace in [*(thing.trace for thing in self.things.values()), *self._passing]:
             moments += trace.moments(t)
         loads: Floats = moments @ self.shares.T

@@ -29,9 +29,9 @@ class HandParameters:
     tilt_m: float = 0.01
     #: Time in a reader's field before the thing touches the board, and after it has left.
     approach_s: tuple[float, float] = (0.0, 0.8)
-    #: A thing that is moved is lifted for so long, or else pushed along the board.
+    #: A thing that is moved through the air is off the board for so long; one that is pushed takes at least so long.
     lift_s: tuple[float, float] = (0.3, 4.0)
-    slide_share: float = 0.3
+    slide_s: float = 0.4
     lean_g: tuple[float, float] = (300.0, 5000.0)
     lean_s: tuple[float, float] = (1.0, 15.0)
 
@@ -50,9 +50,9 @@ class Trace:
         return float(self.t[-1])
 
     def moments(self, t: Floats) -> Floats:
-        """(F, F x, F y) at times (n,), as (n, 3)."""
-        force = np.interp(t, self.t, self.force_g)
-        return np.column_stack([force, force * np.interp(t, self.t, self.x), force * np.interp(t, self.t, self.y)])
+        """(F, F x, F y, F x y) at times (n,), as (n, 4)."""
+        force, x, y = (np.interp(t, self.t, values) for values in (self.force_g, self.x, self.y))
+        return np.column_stack([force, force * x, force * y, force * x * y])
 
 
 class Hands:
@@ -71,9 +71,6 @@ class Hands:
 
     def approach(self) -> float:
         return float(self._rng.uniform(*self.parameters.approach_s))
-
-    def slides(self) -> bool:
-        return bool(self._rng.random() < self.parameters.slide_share)
 
     def put(self, start: float, weight_g: float, xy: Xy, seconds: float) -> Trace:
         """From nothing over too much to the weight."""
@@ -108,7 +105,7 @@ class Hands:
         force[1:-1] *= 1.0 + p.tremor_share * rng.standard_normal(7)
         way = s * s * (3 - 2 * s)
         x, y = old[0] + (new[0] - old[0]) * way, old[1] + (new[1] - old[1]) * way
-        return Trace(start + s * self.seconds(slow), np.maximum(force, 0.0), x, y)
+        return Trace(start + s * max(p.slide_s, self.seconds(slow)), np.maximum(force, 0.0), x, y)
 
     def lean(self, start: float, xy: Xy, force_g: float | None, seconds: float | None) -> Trace:
         """An arm on the board: a large force that is never still, and leaves nothing behind."""

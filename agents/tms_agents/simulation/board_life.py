@@ -27,6 +27,9 @@ class LifeParameters:
     stagger_s: float = 1.5
     move_share: float = 0.25
     lean_share: float = 0.05
+    #: Of the moves: along the board, and how far.
+    slide_share: float = 0.3
+    slide_m: tuple[float, float] = (0.05, 0.15)
     #: Things keep so far from the board's edge and, where there is room, from one another.
     margin_m: float = 0.03
     apart_m: float = 0.08
@@ -69,6 +72,8 @@ class Household:
             return (first, self._come_or_go(float(rng.uniform(0, p.stagger_s)), but=first.name))
         if kind < p.lean_share + p.pair_share + p.move_share and self.world.things:
             name = self._pick(self.world.things)
+            if rng.random() < p.slide_share:
+                return (self.world.move(name, self._beside(self.world.things[name].xy), slide=True),)
             return (self.world.move(name, self._spot()),)
         return (self._come_or_go(0.0),)
 
@@ -84,6 +89,15 @@ class Household:
     def _pick(self, names: Iterable[str]) -> str:
         choice = sorted(names)
         return str(choice[int(self._rng.integers(len(choice)))])
+
+    def _beside(self, xy: Xy) -> Xy:
+        """A place on the board to which a thing may be pushed from ``xy``."""
+        p, board = self.parameters, self.world.parameters
+        while True:
+            way, angle = self._rng.uniform(*p.slide_m), self._rng.uniform(0, 2 * math.pi)
+            x, y = xy[0] + way * math.cos(angle), xy[1] + way * math.sin(angle)
+            if p.margin_m <= x <= board.width - p.margin_m and p.margin_m <= y <= board.depth - p.margin_m:
+                return (x, y)
 
     def _spot(self) -> Xy:
         """A free place, or after many tries any place."""

@@ -32,8 +32,8 @@ class TagParameters:
     #: Tags near the cabinet that are never in it, for stray reads; things that were taken out are read astray too.
     strangers: tuple[str, ...] = ()
     #: A round begins every so often, each zone in its turn; its antenna is on for so long.
-    period_s: float = 1.0
-    on_s: float = 0.3
+    period_s: float = 0.5
+    on_s: float = 0.15
 
 
 @dataclass(frozen=True, slots=True)
