@@ -1,0 +1,177 @@
+"""Weighing modules over Modbus RTU and TCP. pymodbus does the bytes; this asks, and says how the device is.
+
+``ModbusLink`` listens like ``transport.Link``. pymodbus comes with the extra ``modbus``, imported where a device is
+opened.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncGenerator, Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from tms_agents.devices.loads import LoadSample
+from tms_agents.devices.modbus.registers import WeighingMap
+from tms_agents.devices.transport import DeviceFault, DeviceState
+from tms_client.cli import CommandError
+from tms_client.flows import Retry
+
+if TYPE_CHECKING:
+    from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
+
+    Client = AsyncModbusSerialClient | AsyncModbusTcpClient
+
+#: Makes a client that is not connected yet, given the time to wait for an answer in seconds.
+ClientOpener = Callable[[float], "Client"]
+
+_BUSY = (5, 6)
+_REFUSALS = {
+    1: "illegal function",
+    2: "illegal data address",
+    3: "illegal data value",
+    4: "device failure",
+    10: "gateway path unavailable",
+    11: "no answer behind the gateway",
+}
+
+
+def modbus_tcp(host: str, port: int = 502) -> ClientOpener:
+    def open_(reply_s: float) -> Client:
+        _need_pymodbus()
+        from pymodbus.client import AsyncModbusTcpClient
+
+        return AsyncModbusTcpClient(host, port=port, timeout=reply_s, retries=0, reconnect_delay=0)
+
+    return open_
+
+
+def modbus_rtu(device: str, baud: int = 9600, *, parity: str = "N", bits: int = 8, stop_bits: int = 1) -> ClientOpener:
+    def open_(reply_s: float) -> Client:
+        _need_pymodbus()
+        from pymodbus.client import AsyncModbusSerialClient
+
+        Path(device).stat()  # pymodbus does not say why it cannot open a port
+        return AsyncModbusSerialClient(
+            device,
+            baudrate=baud,
+            parity=parity,
+            bytesize=bits,
+            stopbits=stop_bits,
+            timeout=reply_s,
+            retries=0,
+            reconnect_delay=0,
+        )
+
+    return open_
+
+
+class ModbusLink:
+    """Asks one module every ``period_s`` and delivers a ``LoadSample`` for each complete answer.
+
+    After an answer that did not come within ``reply_s`` it waits as long again before it asks anew: a late answer of
+    RTU says not what it answers. A refusal by the module is a fault, with the reason; "busy" is not.
+    """
+
+    def __init__(
+        self,
+        opener: ClientOpener,
+        registers: WeighingMap,
+        *,
+        name: str,
+        period_s: float = 0.1,
+        reply_s: float = 0.5,
+        silent_after_s: float = 10.0,
+        retry: Retry | None = None,
+    ) -> None:
+        self._open, self._map, self._name = opener, registers, name
+        self._period_s, self._reply_s, self._silent_after_s = period_s, reply_s, silent_after_s
+        self._retry = retry or Retry(first_s=0.2, cap_s=10.0)
+        self._state: DeviceState | None = None
+
+    async def listen(self) -> AsyncGenerator[Sequence[LoadSample] | DeviceState, None]:
+        """Samples one at a time, and the state whenever it changes.
+
+        Raises:
+            CommandError: pymodbus is not installed.
+        """
+        failures = 0
+        while True:
+            try:
+                async with contextlib.aclosing(self._connection()) as items:
+                    async for item in items:
+                        if isinstance(item, DeviceState) and item.state == "connected":
+                            failures = 0
+                        yield item
+                why = "the connection was closed by the device"
+            except (OSError, ValueError, DeviceFault) as error:
+                why = str(error) or type(error).__name__
+            for state in self._change("faulty", f"{self._name}: {why}"):
+                yield state
+            failures += 1
+            await asyncio.sleep(self._retry.pause(failures))
+
+    async def _connection(self) -> AsyncGenerator[Sequence[LoadSample] | DeviceState, None]:
+        client = self._open(self._reply_s)
+        client.set_max_no_responses(1 << 30)  # silence is judged here
+        clock = asyncio.get_running_loop().time
+        alive = due = clock()
+        try:
+            if not await client.connect():
+                raise DeviceFault("cannot be reached")
+            while True:
+                registers = await self._ask(client)
+                if registers is None and not client.connected:
+                    return
+                if registers is not None:
+                    alive = clock()
+                    for state in self._change("connected", self._name):
+                        yield state
+                    if registers:
+                        yield [self._map.decode(registers)]
+                elif clock() - alive > self._silent_after_s:
+                    for state in self._change("silent", f"{self._name}: nothing for {self._silent_after_s:g} s"):
+                        yield state
+                    if clock() - alive > 3 * self._silent_after_s:
+                        raise DeviceFault(f"nothing for {3 * self._silent_after_s:g} s")
+                due = max(due + self._period_s, clock())
+                await asyncio.sleep(self._reply_s if registers is None else due - clock())
+        finally:
+            client.close()
+
+    async def _ask(self, client: Client) -> dict[int, int] | None:
+        """Registers by address; empty where the module is busy, None where an answer is missing."""
+        from pymodbus import ModbusException
+
+        read = client.read_holding_registers if self._map.function == 3 else client.read_input_registers
+        registers: dict[int, int] = {}
+        for address, count in self._map.blocks():
+            try:
+                answer = await read(address, count=count, device_id=self._map.device_id)
+            except ModbusException:
+                return None
+            if answer.isError():
+                code = getattr(answer, "exception_code", 0)
+                if code in _BUSY:
+                    return {}
+                why = _REFUSALS.get(code, f"exception {code}")
+                raise DeviceFault(f"device {self._map.device_id} refuses register {address}: {why}")
+            if len(answer.registers) != count:
+                raise DeviceFault(f"{len(answer.registers)} registers at {address} instead of {count}")
+            registers |= {address + i: value for i, value in enumerate(answer.registers)}
+        return registers
+
+    def _change(self, state: Literal["connected", "silent", "faulty"], why: str) -> list[DeviceState]:
+        new = DeviceState(state, why[:500])
+        if new == self._state:
+            return []
+        self._state = new
+        return [new]
+
+
+def _need_pymodbus() -> None:
+    try:
+        import pymodbus  # noqa: F401
+    except ImportError as error:
+        raise CommandError("Modbus devices need: pip install 'robot-town-tms[modbus]'") from error
