@@ -32,6 +32,8 @@ def field_values(code: str) -> st.SearchStrategy:
         return st.lists(st.integers(0, 2**16 - 1), max_size=4).map(tuple)
     if code == "e":
         return st.binary(max_size=4).map(lambda raw: (8 * len(raw), raw))
+    if code == "y":
+        return st.binary(max_size=8).map(lambda raw: (len(raw), raw))
     if code == "*":
         return st.binary(max_size=6)
     return st.binary(min_size=int(code), max_size=int(code))

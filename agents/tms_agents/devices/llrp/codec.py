@@ -227,7 +227,7 @@ def _write(code: str, value: Value) -> bytes:
     if isinstance(value, str):
         text = value.encode("utf-8", "surrogateescape")
         return struct.pack(">H", len(text)) + text
-    if code == "e":
+    if code in "ey":
         count, raw = value
         assert isinstance(raw, bytes)
         return struct.pack(">H", count) + raw

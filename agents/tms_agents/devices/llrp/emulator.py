@@ -180,7 +180,7 @@ _CAPABILITIES = (
         "LLRPCapabilities",
         {
             "Flags": 0,
-            "MaxPriorityLevelSupported": 1,
+            "MaxNumPriorityLevelsSupported": 1,
             "ClientRequestOpSpecTimeout": 0,
             "MaxNumROSpecs": 1,
             "MaxNumSpecsPerROSpec": 1,
@@ -204,11 +204,11 @@ _CAPABILITIES = (
                         (Parameter("FixedFrequencyTable", {"Frequency": (916800,)}),),
                     ),
                     Parameter(
-                        "UHFC1G2RFModeTable",
+                        "C1G2UHFRFModeTable",
                         {},
                         (
                             Parameter(
-                                "UHFC1G2RFModeTableEntry",
+                                "C1G2UHFRFModeTableEntry",
                                 {
                                     "ModeIdentifier": 0,
                                     "Flags": 0,
