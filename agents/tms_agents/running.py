@@ -15,7 +15,7 @@ import contextlib
 import logging
 import signal
 import time
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated, Any, TypeVar
@@ -162,6 +162,42 @@ async def running(
                 await poster.drain(drain_s)
             posted.trouble = str(poster.trouble or "")
         posted.buried, posted.waiting = spool.buried - buried_before, len(spool)
+
+
+async def merged(
+    sources: Mapping[str, AsyncGenerator[T, None]], *, most_waiting: int = 1000
+) -> AsyncGenerator[tuple[str, T], None]:
+    """What several sources deliver, with their names, as it comes; ends when all have ended.
+
+    A source whose items are not taken waits. What one raises is raised here; close this to close them all.
+    """
+    waiting: asyncio.Queue[tuple[str, T] | Exception | None] = asyncio.Queue(most_waiting)
+
+    async def pump(name: str, source: AsyncGenerator[T, None]) -> None:
+        try:
+            async with contextlib.aclosing(source):
+                async for item in source:
+                    await waiting.put((name, item))
+        except Exception as error:
+            await waiting.put(error)
+        else:
+            await waiting.put(None)
+
+    tasks = [asyncio.create_task(pump(name, source)) for name, source in sources.items()]
+    try:
+        open_ = len(tasks)
+        while open_:
+            item = await waiting.get()
+            if isinstance(item, Exception):
+                raise item
+            if item is None:
+                open_ -= 1
+            else:
+                yield item
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
 
 async def until_signalled(work: Coroutine[Any, Any, T]) -> T:

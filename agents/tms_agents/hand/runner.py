@@ -4,34 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
-from pydantic import ValidationError
-
-from tms_agents.devices.tags import RoundEnd
 from tms_agents.devices.transport import DeviceState
 from tms_agents.hand.config import HandConfig
-from tms_agents.hand.visits import Visits
+from tms_agents.hand.sightings import Sightings, Tally
 from tms_agents.readers import CaptureSource, Seen, open_reader
-from tms_agents.running import Posted, running
-from tms_schemas.observation import RawRead
+from tms_agents.running import running
 
-log = logging.getLogger(__name__)
-
-
-@dataclass(slots=True)
-class Tally(Posted):
-    """What a run did. ``unusable`` tags have ids that the wire cannot carry (longer than 64 hex digits)."""
-
-    reports: int = 0
-    tags: set[str] = field(default_factory=set)
-    unusable: set[str] = field(default_factory=set)
-
-    def in_words(self) -> str:
-        return f"{self.reports} reports of {len(self.tags)} tags, {Posted.in_words(self)}"
+__all__ = ["Tally", "run"]
 
 
 async def run(
@@ -48,9 +30,15 @@ async def run(
 
     Raises:
         SpoolError: the spool cannot be opened.
-        CommandError: a capture cannot be read.
+        CommandError: a capture cannot be read, the description of an arm cannot be used.
     """
-    tally, visits = Tally(), Visits(config.visits.gap_s)
+    if config.hands:
+        from tms_agents.hand.robot_runner import run_robot  # needs numpy, which reading tags alone does not
+
+        return await run_robot(config, drain_s=drain_s, progress=progress, clock=clock)
+    assert config.source is not None
+    tally = Tally()
+    sightings = Sightings(config.visits.gap_s, tally, each=not config.counts_visits)
     heartbeat_s = None if isinstance(config.source, CaptureSource) else config.heartbeat_s
     arrivals = open_reader(config.source, silent_after_s=config.silent_after_s, clock=clock)
     async with running(config, drain_s=drain_s, heartbeat_s=heartbeat_s, posted=tally, clock=clock) as agent:
@@ -59,29 +47,10 @@ async def run(
                 if isinstance(item, DeviceState):
                     await agent.device("reader", at, item)
                 else:
-                    await agent.observations(*raw_reads(config, visits, tally, item))
+                    seen = [one for one in item if isinstance(one, Seen)]
+                    told = [read for one in seen for read in sightings.see(one, config.zone_of(one.read.antenna))]
+                    await agent.observations(*told)
                 progress(tally)
         if not once:
             await asyncio.Event().wait()
     return tally
-
-
-def raw_reads(config: HandConfig, visits: Visits, tally: Tally, items: Sequence[Seen | RoundEnd]) -> list[RawRead]:
-    """What is posted of a group of reports: each, or each that begins a visit."""
-    observations: list[RawRead] = []
-    for seen in items:
-        if isinstance(seen, RoundEnd):
-            continue
-        tag, zone = seen.read.tag, config.zone_of(seen.read.antenna)
-        tally.reports += 1
-        begins = visits.see(zone, tag, seen.first, seen.last)
-        if config.counts_visits and not begins:
-            continue
-        try:
-            observations.append(RawRead(seq=0, observed_at=seen.first, zone=zone, tag=tag))
-            tally.tags.add(tag)
-        except ValidationError:
-            if tag not in tally.unusable:
-                log.warning("tag %s cannot be posted: its id has more than 64 digits", tag)
-            tally.unusable.add(tag)
-    return observations

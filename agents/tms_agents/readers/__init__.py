@@ -5,6 +5,7 @@ from tms_agents.readers.config import (
     LlrpSource,
     Port,
     ReaderSource,
+    ThingMagicSource,
     Tr3SerialSource,
     Tr3TcpSource,
 )
@@ -17,6 +18,7 @@ __all__ = [
     "Port",
     "ReaderSource",
     "Seen",
+    "ThingMagicSource",
     "Tr3SerialSource",
     "Tr3TcpSource",
     "can_pause",

@@ -47,6 +47,23 @@ class Tr3TcpSource(_Tr3):
     port: Port = 9004
 
 
+class ThingMagicSource(Section):
+    """A ThingMagic M5e or M6e module (UHF) on a serial line."""
+
+    kind: Literal["thingmagic"]
+    device: str
+    baud: Annotated[int, Field(ge=300, le=4_000_000)] = 115200
+    antennas: Annotated[list[Annotated[int, Field(ge=1, le=255)]], Field(min_length=1, max_length=64)] = [1]
+    #: Decides on the legal frequencies.
+    region: Literal["NA", "EU", "KR", "IN", "JP", "PRC", "EU2", "EU3", "KR2", "OPEN"] = "JP"
+    #: The reader's own where it is not given.
+    power_dbm: Annotated[float, Field(ge=-20, le=40)] | None = None
+    #: ``multiple`` collects all tags of a read; ``single`` reads one at a time.
+    mode: Literal["multiple", "single"] = "multiple"
+    read_ms: Annotated[int, Field(ge=10, le=10_000)] = 200
+    poll_s: Seconds = 0.5
+
+
 class CaptureSource(Section):
     """Raw bytes of a reader in a file; an LLRP capture may hold both directions of the conversation."""
 
@@ -59,4 +76,6 @@ class CaptureSource(Section):
     frame_s: Annotated[float, Field(ge=0, le=3600)] = 0.1
 
 
-ReaderSource = Annotated[LlrpSource | Tr3SerialSource | Tr3TcpSource | CaptureSource, Field(discriminator="kind")]
+ReaderSource = Annotated[
+    LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource | CaptureSource, Field(discriminator="kind")
+]

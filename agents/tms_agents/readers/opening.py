@@ -9,10 +9,18 @@ from datetime import UTC, datetime
 
 from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.tags import Field, RoundEnd, TagItem, TagRead
+from tms_agents.devices.thingmagic.session import ThingMagicSession
 from tms_agents.devices.tr3.session import Tr3Session
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
 from tms_agents.readers.capture import groups
-from tms_agents.readers.config import CaptureSource, LlrpSource, ReaderSource, Tr3SerialSource, Tr3TcpSource
+from tms_agents.readers.config import (
+    CaptureSource,
+    LlrpSource,
+    ReaderSource,
+    ThingMagicSource,
+    Tr3SerialSource,
+    Tr3TcpSource,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +65,12 @@ async def open_reader(
 
 def can_pause(source: ReaderSource) -> bool:
     """Whether the reader switches its field off when asked."""
-    return isinstance(source, Tr3SerialSource | Tr3TcpSource) and source.mode == "inventory"
+    polled = isinstance(source, Tr3SerialSource | Tr3TcpSource) and source.mode == "inventory"
+    return polled or isinstance(source, ThingMagicSource)
 
 
 def _link(
-    source: LlrpSource | Tr3SerialSource | Tr3TcpSource, silent_after_s: float, field: Field | None
+    source: LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource, silent_after_s: float, field: Field | None
 ) -> Link[TagItem]:
     if isinstance(source, LlrpSource):
         return Link(
@@ -69,6 +78,17 @@ def _link(
             lambda: LlrpSession(antennas=source.antennas, keepalive_s=source.keepalive_s),
             name=f"LLRP reader {source.host}:{source.port}",
             silent_after_s=max(silent_after_s, 2.5 * source.keepalive_s),
+        )
+    if isinstance(source, ThingMagicSource):
+        return Link(
+            serial(source.device, source.baud),
+            lambda: ThingMagicSession(
+                **source.model_dump(include={"antennas", "region", "power_dbm", "mode", "read_ms", "poll_s"}),
+                field=field,
+            ),
+            name=f"ThingMagic {source.device}",
+            silent_after_s=silent_after_s,
+            tick_s=min(0.05, source.poll_s / 2),
         )
     if isinstance(source, Tr3SerialSource):
         opener, name = serial(source.device, source.baud), f"TR3 {source.device}"
