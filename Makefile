@@ -4,13 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench faults realdata clean help
+.PHONY: demo test test-fast check format bench bench-cabinet faults realdata clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
 	@echo "make test      set up and run all tests (SQLite, PostgreSQL, Chromium)"
 	@echo "make check     ruff, mypy strict, import arrows"
 	@echo "make bench     the published numbers of docs/benchmarks.md"
+	@echo "make bench-cabinet  the smart cabinet on simulated boards (docs/cabinet_position.png)"
 	@echo "make faults    the long fault tests (30 kills and more)"
 
 demo: $(READY)
@@ -32,6 +33,9 @@ format: $(READY)
 bench: $(READY)
 	$(BIN)/python benchmarks/placement.py
 	$(BIN)/python benchmarks/ingest.py
+
+bench-cabinet: $(READY)
+	$(BIN)/python benchmarks/cabinet.py
 
 faults: $(READY)
 	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults

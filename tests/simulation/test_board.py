@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -307,3 +311,81 @@ def test_a_household_leaves_on_the_board_what_its_changes_say(seed: int) -> None
                 there[change.name] = (change.weight_g, change.xy)
         moments = sum((moments_of(w, xy) for w, xy in there.values()), np.zeros(4))
         assert np.abs(episode.recording.counts[-1] * 5 - world.shares @ moments).max() <= 2.5 + 1e-6
+
+
+# the yardstick of the cabinet benchmark
+
+
+def laboratory() -> ModuleType:
+    path = Path(__file__).resolve().parents[2] / "benchmarks" / "laboratory.py"
+    spec = importlib.util.spec_from_file_location("laboratory", path)
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["laboratory"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def told_by(cabinet: Any, world: BoardWorld, seconds: float) -> list[Any]:
+    recording = world.run(seconds)
+    rounds = list(recording.rounds)
+    told = []
+    for t, grams in zip(recording.t, world.grams(recording.counts), strict=True):
+        while rounds and rounds[0].t <= t:
+            cabinet.inventory(rounds.pop(0).tags)
+        told += cabinet.load(float(t), grams)
+    return told
+
+
+def test_the_laboratorys_algorithm_sees_in_move_and_out_in_an_easy_world() -> None:
+    parameters = BoardParameters(
+        torsion=0.0,
+        electronics=CellParameters(**(IDEAL | {"noise_sd_g": 2.0})),
+        hands=HandParameters(slow_share=0, quick_s=(0.1, 0.15), press_share=0, press_g=0, approach_s=(0.8, 1.2)),
+        tags=TagParameters(miss_rate=0, stray_rate=0),
+    )
+    world = BoardWorld(parameters, np.random.default_rng(12))
+    cabinet = laboratory().LaboratoryCabinet(parameters.cells)
+    assert told_by(cabinet, world, 3.0) == []
+    for i, xy in enumerate([(0.1, 0.1), (0.35, 0.2), (0.2, 0.25)]):
+        world.place(f"thing{i}", 300.0 + 200 * i, xy, f"TAG{i}")
+        (told,) = told_by(cabinet, world, 6.0)
+        assert (told.kind, told.tag) == ("in", f"TAG{i}")
+        assert told.xy == pytest.approx(xy, abs=0.02)
+        assert told.weight_g == pytest.approx(300 + 200 * i, abs=10)
+    world.move("thing1", (0.1, 0.22))
+    (told,) = told_by(cabinet, world, 8.0)
+    assert (told.kind, told.tag) == ("move", "TAG1")
+    assert told.xy == pytest.approx((0.1, 0.22), abs=0.02)
+    world.take("thing2")
+    (told,) = told_by(cabinet, world, 6.0)
+    assert (told.kind, told.tag) == ("out", "TAG2")
+
+
+def test_the_laboratorys_algorithm_keeps_its_published_defects() -> None:
+    cabinet = laboratory().LaboratoryCabinet(LABORATORY_CELLS)
+    load = np.zeros(4)
+
+    def stand_still(t: float, added: Any = 0.0) -> list[Any]:
+        nonlocal load
+        load = load + added
+        return [told for i in range(11) for told in cabinet.load(t + 0.02 * i, load)]
+
+    stand_still(0.0)
+    # Signs are lost: what a rigid board's corner load does to the far cell pulls the position towards it.
+    cabinet.inventory(frozenset({"A"}))
+    (told,) = stand_still(1.0, np.array([750.0, 250.0, 250.0, -250.0]))
+    assert told.kind == "in"
+    assert told.xy[0] > 0.2
+    # Of two tags that come in one cycle, the second is never noticed; one missed read is an exit.
+    cabinet.inventory(frozenset({"A", "B", "C"}))
+    (told,) = stand_still(2.0, np.full(4, 100.0))
+    assert told.tag == "B"
+    assert stand_still(3.0, np.full(4, 100.0)) == []
+    cabinet.inventory(frozenset({"B", "C"}))
+    (told,) = stand_still(4.0)
+    assert (told.kind, told.tag) == ("out", "A")
+    # An untagged thing is ignored, a load that never stands still is waited for without end.
+    assert stand_still(5.0, np.full(4, 100.0)) == []
+    shaken = [told for i in range(200) for told in cabinet.load(6.0 + i, load + 40.0 * (-1) ** i)]
+    assert shaken == []

@@ -1,0 +1,34 @@
+"""Cramér-Rao limit of the position of a load, from a world's own parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def position_limit(shares: Floats, weight_g: float, xy: tuple[float, float], variance_g2: float) -> float:
+    """Least root mean square distance (m) of any unbiased estimate of a load's place whose weight is unknown too.
+
+    ``shares`` (k, 4) as of the board's statics; ``variance_g2`` of the difference that each cell shows.
+    """
+    x, y = xy
+    # Derivative of each cell's load by weight, x and y.
+    jacobian = shares @ np.array(
+        [[1.0, 0.0, 0.0], [x, weight_g, 0.0], [y, 0.0, weight_g], [x * y, weight_g * y, weight_g * x]]
+    )
+    information = jacobian.T @ jacobian / variance_g2
+    covariance = np.linalg.inv(information)
+    return float(np.sqrt(covariance[1, 1] + covariance[2, 2]))
+
+
+def difference_variance(
+    noise_sd_g: Floats, before: NDArray[np.bool_], after: NDArray[np.bool_], step_g: float
+) -> float:
+    """Least variance of (level after - level before) of a cell whose samples have deviations ``noise_sd_g`` (n,).
+
+    Rounding to ``step_g`` counts as uniform noise; samples are weighted by what each is worth.
+    """
+    worth = 1.0 / (noise_sd_g**2 + step_g**2 / 12)
+    return float(1.0 / worth[before].sum() + 1.0 / worth[after].sum())

@@ -1,0 +1,136 @@
+"""How near a contestant comes to the least possible error of position, by weight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from cabinet_contestants import Contestant, Detection
+from cabinet_limits import difference_variance, position_limit
+
+from tms_agents.cabinet import KnownWeight
+from tms_agents.simulation.board import BoardParameters, BoardWorld, Recording
+from tms_agents.simulation.board_noise import CellParameters
+
+WEIGHTS_G = (25, 50, 100, 200, 500, 1000, 2000)
+#: A well calibrated board away from any compressor; drift, creep, antenna noise and rounding are as everywhere.
+BOARD = BoardParameters(electronics=CellParameters(vibration_g=0.0, gain_error_sd=0.0))
+REST_S, LATE_S = 8.0, 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Precision:
+    """Root mean squares over the trials in which the thing was found: of the first report, and five seconds later."""
+
+    found: float
+    rmse_m: float
+    limit_m: float
+    late_rmse_m: float
+    late_limit_m: float
+
+
+def precision(
+    contestant: Callable[[BoardWorld, dict[str, KnownWeight]], Contestant], weight: int, trials: int
+) -> Precision:
+    """Put and take a thing of unknown weight again and again, at random places."""
+    matter, places = np.random.default_rng(weight).spawn(2)
+    world = BoardWorld(BOARD, matter)
+    cabinet = contestant(world, {})
+    _play(world, cabinet, world.run(5.0))
+    squares: list[tuple[float, float, float, float]] = []
+    for trial in range(trials):
+        empty_since = world.settled_at
+        idle = world.run(REST_S)
+        _play(world, cabinet, idle)
+        xy = (float(places.uniform(0.04, 0.425)), float(places.uniform(0.047, 0.27)))
+        change = world.place(f"thing{trial}", float(weight), xy, f"E00401{trial:010X}")
+        settling = world.run(change.stable - world.time_s + LATE_S)
+        said = _play(world, cabinet, settling)
+        first = next((one for one in said if one.kind == "in" and one.xy is not None and one.at >= change.start), None)
+        if first is not None and first.xy is not None:
+            late = cabinet.position_now(first.stay)
+            limits = [
+                _limit(world, weight, xy, (empty_since, change.start), (change.stable, until))
+                for until in (max(first.at, change.stable + 0.2), change.stable + LATE_S)
+            ]
+            error = math.dist(first.xy, xy)
+            squares.append((error**2, limits[0] ** 2, math.dist(late, xy) ** 2 if late else math.nan, limits[1] ** 2))
+        _play(world, cabinet, world.run(1.0))
+        out = world.take(f"thing{trial}")
+        _play(world, cabinet, world.run(out.stable - world.time_s + 2.0))
+    if not squares:
+        return Precision(0.0, *[math.nan] * 4)
+    means = np.sqrt(np.nanmean(np.array(squares), axis=0)).tolist()
+    return Precision(len(squares) / trials, means[0], means[1], means[2], means[3])
+
+
+def _limit(
+    world: BoardWorld, weight: int, xy: tuple[float, float], before: tuple[float, float], after: tuple[float, float]
+) -> float:
+    """The limit with every sample of the empty board since ``before`` and of the loaded one in ``after``."""
+    p = world.parameters
+    samples = np.arange(math.ceil(before[0] / p.period_s), math.floor(after[1] / p.period_s) + 1)
+    t = samples.astype(np.float64) * p.period_s
+    factor = np.where(world.reader.on_at(t), p.electronics.rf_noise_factor, 1.0)
+    variance = difference_variance(
+        p.electronics.noise_sd_g * factor,
+        (t >= before[0]) & (t <= before[1]),
+        (t >= after[0]) & (t <= after[1]),
+        p.electronics.gram_per_count,
+    )
+    return position_limit(world.shares, weight, xy, variance)
+
+
+def _play(world: BoardWorld, cabinet: Contestant, recording: Recording) -> list[Detection]:
+    return list(played(world, cabinet, recording))
+
+
+def played(world: BoardWorld, contestant: Contestant, recording: Recording) -> Iterator[Detection]:
+    """Samples and rounds to the contestant, in the order of time."""
+    grams = world.grams(recording.counts)
+    rounds = iter(recording.rounds)
+    due = next(rounds, None)
+    for t, sample in zip(recording.t.tolist(), grams, strict=True):
+        yield from contestant.load(t, sample)
+        while due is not None and due.t <= t + 1e-9:
+            yield from contestant.inventory(due.t, due.zone, due.tags)
+            due = next(rounds, None)
+
+
+def draw(by_weight: dict[int, tuple[Precision, Precision]], path: Path) -> None:
+    """The table as a picture, both axes logarithmic."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise SystemExit("no matplotlib: pip install 'robot-town-tms[dev]'") from None
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    from matplotlib.ticker import ScalarFormatter
+
+    weights = list(by_weight)
+    ours, laboratory = zip(*by_weight.values(), strict=True)
+    figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
+    mm = 1e3
+    axes.plot(weights, [mm * one.rmse_m for one in laboratory], "s-", color="#b4540a", label="laboratory's algorithm")
+    axes.plot(weights, [mm * one.rmse_m for one in ours], "o-", color="#1f5fa8", label="first report")
+    axes.plot(weights, [mm * one.limit_m for one in ours], "--", color="#1f5fa8", label="its Cramér-Rao limit")
+    axes.plot(weights, [mm * one.late_rmse_m for one in ours], "o-", color="#2a8a4a", label="after five seconds")
+    axes.plot(weights, [mm * one.late_limit_m for one in ours], "--", color="#2a8a4a", label="its Cramér-Rao limit")
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xticks=weights,
+        xlabel="weight of the thing in g",
+        ylabel="position error (root mean square) in mm",
+        title="Where on the board? Four cells, noise 8 g, counts of 5 g",
+    )
+    axes.xaxis.set_major_formatter(ScalarFormatter())
+    axes.yaxis.set_major_formatter(ScalarFormatter())
+    axes.minorticks_off()
+    axes.grid(alpha=0.3)
+    axes.legend()
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
