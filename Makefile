@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet faults realdata clean help
+.PHONY: demo test test-fast check format bench bench-cabinet faults fuzz realdata clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -13,6 +13,7 @@ help:
 	@echo "make bench     the published numbers of docs/benchmarks.md"
 	@echo "make bench-cabinet  the smart cabinet on simulated boards (docs/cabinet_position.png)"
 	@echo "make faults    the long fault tests (30 kills and more)"
+	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
 
 demo: $(READY)
 	$(BIN)/tms demo $(DEMO)
@@ -39,6 +40,9 @@ bench-cabinet: $(READY)
 
 faults: $(READY)
 	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults
+
+fuzz: $(READY)
+	$(BIN)/python benchmarks/fuzz_devices.py $(FUZZ)
 
 realdata: $(READY)
 	$(BIN)/python -m pytest -q -m realdata

@@ -1,0 +1,281 @@
+"""Feeds every parser of device bytes with seeded random and mutated input, and prints a table.
+
+    python benchmarks/fuzz_devices.py                      one million inputs each, a few minutes
+    python benchmarks/fuzz_devices.py --only tr3 --inputs 10000 --seed 7
+
+Checked after every input: no exception but ``DeviceFault`` (which a session may raise and is then begun anew), and no
+more bytes held than the parser promises. Checked over a further run: traced memory does not grow. Status 1, with the
+seed and the bytes, where anything fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from tms_agents.devices.lines import LineParser
+from tms_agents.devices.llrp import messages
+from tms_agents.devices.llrp.codec import MAX_MESSAGE, encode
+from tms_agents.devices.llrp.codec import FrameParser as LlrpParser
+from tms_agents.devices.llrp.session import LlrpSession
+from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.modbus import StatusRegister, WeighingMap
+from tms_agents.devices.scales import DialectName, ScaleLineSession
+from tms_agents.devices.tags import TagRead
+from tms_agents.devices.tr3.codec import MAX_FRAME, command_mode, inventory, select_antenna
+from tms_agents.devices.tr3.codec import Frame as Tr3Frame
+from tms_agents.devices.tr3.codec import FrameParser as Tr3Parser
+from tms_agents.devices.tr3.session import Tr3Session
+from tms_agents.devices.transport import DeviceFault, Session
+
+#: Inputs of the run in which memory is traced, and what it may grow by beside the buffers, in bytes.
+_TRACED, _SLACK = 20_000, 256_000
+
+
+@dataclass(slots=True)
+class Target:
+    """One parser: ``feed`` takes bytes, ``held`` tells how many it keeps and ``most`` how many it may.
+
+    ``samples`` are well-formed input, to be mutated.
+    """
+
+    feed: Callable[[bytes], object]
+    held: Callable[[], int]
+    most: int
+    samples: Sequence[bytes]
+
+
+class _Clocked:
+    """A session whose time goes on: two milliseconds at most inputs, then a pause in which the line is quiet."""
+
+    def __init__(self, session: Callable[[Callable[[], float]], Session[object]]) -> None:
+        self._make, self._now, self._fed = session, 0.0, 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._session = self._make(lambda: self._now)
+        self._session.opened()
+
+    def feed(self, data: bytes) -> None:
+        self._fed += 1
+        try:
+            self._session.receive(data)
+            for _ in range(1 if self._fed % 7 else 5):
+                self._now += 0.002 if self._fed % 7 else 0.3
+                self._session.tick()
+                self._session.output()
+        except DeviceFault:
+            self._begin()
+            raise
+
+    def held(self) -> int:
+        session: Any = self._session
+        return int(getattr(session, "_parser", session).pending)
+
+
+def _session(
+    make: Callable[[Callable[[], float]], Session[object]], most: int, samples: Sequence[bytes]
+) -> Callable[[], Target]:
+    def target() -> Target:
+        clocked = _Clocked(make)
+        return Target(clocked.feed, clocked.held, most, samples)
+
+    return target
+
+
+_UID = bytes.fromhex("00 7AF9174E000104E0")
+_TR3 = [frame.encode() for frame in (command_mode(), select_antenna(1), inventory())] + [
+    Tr3Frame(0x30, b"\xf0\x02").encode() + Tr3Frame(0x49, _UID).encode() * 2,
+    Tr3Frame(0x31, b"\x44").encode(),
+    Tr3Frame(0x4C, _UID[1:] + bytes(16)).encode(),
+    Tr3Frame(0x30, b"\x9c\x01").encode(),
+    Tr3Frame(0x30).encode(),
+]
+_EPC = "3005FB63AC1F3841EC880467"
+_LLRP = [
+    encode(messages.set_keepalive(3000)),
+    encode(messages.add_rospec((1,))),
+    encode(messages.rospec("ENABLE")),
+    encode(messages.report([TagRead(tag=_EPC, antenna=1, rssi_dbm=-50.0), TagRead(tag=_EPC, antenna=2)])),
+    bytes.fromhex("043f000000200ab288c900f600160080000c0004f8535baadaff010000060000"),
+    bytes.fromhex("041f0000001200000004011f000800000000"),
+    bytes.fromhex("043d0000002c4095892f00f000228d3005fb63ac1f3841ec880467810001 86ce820004ec2ea8354c09880001"),
+]
+_BOARD = [b"246\r\n", b'"-17"OK\r\n', b"OK\r\n8388607\r\n", b"0\n"]
+_SCALES: dict[DialectName, list[bytes]] = {
+    "openscale": [b"12034,0.412,kg,25.81,0,\r\n", b"12,25.81,0,1.0,lbs\r\n", b"0.4,kg,\r\n", b"Readings:\r\n"],
+    "and": [b"ST,+001234.5  g\r\n", b"US,-0000012.3   g\r\n", b"OL,+9999999E+19\r\n", b"EC,E01\r\n", b"\x06\r\n"],
+    "mt-sics": [b"S S     100.00 g\r\n", b"S D      -1.23 kg\r\n", b"S +\r\n", b"ES\r\n", b"T S    1.0 g\r\n"],
+}
+_LONGEST_TEXT = 200
+
+
+def _lines() -> Target:
+    parser = LineParser()
+    return Target(parser.feed, lambda: parser.pending, _LONGEST_TEXT, [*_BOARD, *_SCALES["and"]])
+
+
+def _tr3() -> Target:
+    parser = Tr3Parser()
+    return Target(parser.feed, lambda: parser.pending, MAX_FRAME, _TR3)
+
+
+def _llrp() -> Target:
+    parser = LlrpParser()
+    return Target(parser.feed, lambda: parser.pending, MAX_MESSAGE, _LLRP)
+
+
+def _registers() -> Target:
+    """What a module puts into its registers; the frames around them are parsed by pymodbus."""
+    kinds = [
+        WeighingMap(cells=(0, 2), kind=kind, low_word_first=low, status=StatusRegister(address=4, stable=1))
+        for kind in ("int32", "float32", "uint16")
+        for low in (True, False)
+    ]
+
+    def feed(data: bytes) -> None:
+        words = data.ljust(10, b"\x00")
+        registers = {i: words[2 * i] << 8 | words[2 * i + 1] for i in range(5)}
+        for kind in kinds:
+            kind.decode(registers)
+
+    return Target(feed, lambda: 0, 0, [bytes(10), b"\xff" * 10, b"\x7f\xc0\x00\x00\x00\x01\x02\x03\x00\x01"])
+
+
+def _scale(dialect: DialectName) -> tuple[str, Callable[[], Target]]:
+    name = f"scale {dialect}"
+    return name, _session(
+        lambda clock: ScaleLineSession(dialect, clock=clock, software_parity=False), _LONGEST_TEXT, _SCALES[dialect]
+    )
+
+
+#: Every parser of bytes that come from a device. A new driver adds its line here.
+TARGETS: list[tuple[str, Callable[[], Target]]] = [
+    ("lines", _lines),
+    ("tr3 frames", _tr3),
+    ("tr3 session", _session(lambda clock: Tr3Session(antennas=(0, 1), clock=clock), MAX_FRAME, _TR3)),
+    ("llrp messages", _llrp),
+    ("llrp session", _session(lambda _: LlrpSession(), MAX_MESSAGE, _LLRP)),
+    ("load-cell board", _session(lambda clock: RosTmsBoardSession(clock=clock), _LONGEST_TEXT, _BOARD)),
+    _scale("openscale"),
+    _scale("and"),
+    _scale("mt-sics"),
+    ("modbus registers", _registers),
+]
+
+
+class Failure(Exception):
+    """An input that a parser did not stand."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    inputs: int
+    megabytes: float
+    faults: int
+    held: int
+    most: int
+    growth: int
+    seconds: float
+
+
+def inputs(samples: Sequence[bytes], rng: random.Random) -> Iterator[bytes]:
+    """For ever: samples as they are, mutated, cut, joined, and bytes that mean nothing."""
+    pick, number, below = rng.choice, rng.random, rng.randrange
+    while True:
+        kind, sample = number(), pick(samples)
+        if kind < 0.2:
+            yield sample
+        elif kind < 0.6:
+            mutated = bytearray(sample)
+            for _ in range(below(1, 4)):
+                mutated[below(len(mutated))] = below(256)
+            yield bytes(mutated)
+        elif kind < 0.75:
+            yield sample[: below(len(sample) + 1)]
+        elif kind < 0.85:
+            yield sample[below(len(sample)) :] + pick(samples)
+        else:
+            yield rng.randbytes(below(1, 40))
+
+
+def fuzz(name: str, count: int, seed: int) -> Result:
+    """Raises: Failure."""
+    target, rng = dict(TARGETS)[name](), random.Random(f"{name} {seed}")
+    source = inputs(target.samples, rng)
+    began = time.perf_counter()
+    size = faults = held = 0
+    for i in range(count):
+        data = next(source)
+        size += len(data)
+        try:
+            target.feed(data)
+        except DeviceFault:
+            faults += 1
+        except Exception as error:
+            raise Failure(f"{name}: input {i} of seed {seed}, {data.hex()}: {error!r}") from error
+        if (now := target.held()) > held:
+            held = now
+            if held > target.most:
+                raise Failure(f"{name}: {held} bytes held after input {i} of seed {seed}, {target.most} allowed")
+    seconds = time.perf_counter() - began
+    growth = _growth(target, source, min(_TRACED, count))
+    if growth > _SLACK + target.most:
+        raise Failure(f"{name}: {growth} bytes more in use after {_TRACED} inputs")
+    return Result(count, size / 1e6, faults, held, target.most, growth, seconds)
+
+
+def _growth(target: Target, source: Iterator[bytes], count: int) -> int:
+    """Bytes more in use after ``count`` inputs than after the first tenth of them."""
+    tracemalloc.start()
+    try:
+        before = 0
+        for i in range(count):
+            if i == count // 10:
+                before = tracemalloc.get_traced_memory()[0]
+            try:
+                target.feed(next(source))
+            except DeviceFault:
+                continue
+        return tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--inputs", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--only", default="", metavar="TEXT", help="parsers whose name contains this")
+    args = parser.parse_args()
+    names = [name for name, _ in TARGETS if args.only in name]
+    failed = 0
+    print("| parser | inputs | MB | faults | most bytes held | allowed | growth, bytes | µs per input |")
+    print("|---|---|---|---|---|---|---|---|")
+    with ProcessPoolExecutor(max_workers=args.jobs) as pool:
+        for name, future in [(name, pool.submit(fuzz, name, args.inputs, args.seed)) for name in names]:
+            try:
+                r = future.result()
+            except Failure as failure:
+                failed += 1
+                print(f"| {name} | FAILED: {failure} |", flush=True)
+                continue
+            print(
+                f"| {name} | {r.inputs:,} | {r.megabytes:.1f} | {r.faults:,} | {r.held:,} | {r.most:,} | {r.growth:,} "
+                f"| {r.seconds / max(r.inputs, 1) * 1e6:.1f} |",
+                flush=True,
+            )
+    return 1 if failed or not names else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
