@@ -133,7 +133,7 @@ def test_a_real_report():
 @pytest.mark.parametrize(
     ("message", "number", "raw"),
     [
-        (messages.set_keepalive(10_000), 3, "040300000014000000030000dc00090100002710"),
+        (messages.set_config(10_000), 3, "040300000014000000030000dc00090100002710"),
         (messages.rospec("DELETE", 0), 4, "04150000000e0000000400000000"),
         (
             messages.add_rospec(),

@@ -1,7 +1,7 @@
 """A reader for tests and demos: speaks LLRP over TCP, byte for byte, to one client at a time.
 
-``see`` puts tags before its antennas. While a ROSpec runs they are reported every ``period_s``; ``keepalive``,
-``refuse``, ``silent`` and ``inject`` play the faults of real readers.
+``see`` puts tags before its antennas. While a ROSpec runs they are looked for every ``period_s``. ``refuse``, ``fail``,
+``silent``, ``unplug``, ``inject`` and ``power_cycle`` play the faults of real readers.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 
 from tms_agents.devices.llrp import messages
+from tms_agents.devices.llrp.capabilities import ANTENNAS, CAPABILITIES
 from tms_agents.devices.llrp.codec import FrameParser, Message, Parameter, Value, encode
+from tms_agents.devices.llrp.rospec import RoSpec, run
 from tms_agents.devices.tags import TagRead
 
 _ROSPEC_COMMANDS = {"ADD_ROSPEC", "DELETE_ROSPEC", "ENABLE_ROSPEC", "DISABLE_ROSPEC", "START_ROSPEC", "STOP_ROSPEC"}
@@ -38,8 +40,13 @@ class LlrpEmulator:
         #: Names of the messages received, for tests.
         self.heard: list[str] = []
         self.acknowledged = 0
+        #: A reader that announces the end of an AISpec before it reports its tags.
+        self.reports_late = False
+        self.unplugged: set[int] = set()
         self._period_s, self._clock = period_s, clock
-        self._rospec, self._running, self._immediate = 0, False, False
+        self._rospec: RoSpec | None = None
+        self._running: asyncio.Task[None] | None = None
+        self._events: set[int] = set()
         self._keepalive_s = 0.0
         self._writer: asyncio.StreamWriter | None = None
         self._server: asyncio.Server | None = None
@@ -61,6 +68,28 @@ class LlrpEmulator:
         """Cut the connection as a pulled cable does."""
         if self._writer is not None:
             self._writer.transport.abort()
+
+    def power_cycle(self) -> None:
+        """The supply fails in the middle of a message and returns; nothing that was set up is left."""
+        if self._writer is not None:
+            self.inject(encode(messages.report(list(self.tags.values()) or [TagRead(tag="00" * 12)]))[:17])
+            self._writer.close()
+
+    def unplug(self, antenna: int) -> None:
+        self.unplugged.add(antenna)
+        self._notify(messages.ANTENNA_EVENT, Parameter("AntennaEvent", {"EventType": 0, "AntennaID": antenna}))
+
+    def plug_in(self, antenna: int) -> None:
+        self.unplugged.discard(antenna)
+        self._notify(messages.ANTENNA_EVENT, Parameter("AntennaEvent", {"EventType": 1, "AntennaID": antenna}))
+
+    def lose_reports(self) -> None:
+        """Its buffer for reports was full."""
+        self._notify(messages.REPORT_BUFFER_EVENT, Parameter("ReportBufferOverflowErrorEvent"))
+
+    def _notify(self, kind: int, event: Parameter) -> None:
+        if kind in self._events and not self.silent:
+            self.inject(encode(messages.event(self._utc(), event)))
 
     def _utc(self) -> datetime:
         return datetime.fromtimestamp(self._clock(), UTC)
@@ -89,8 +118,8 @@ class LlrpEmulator:
         if refuse:
             writer.close()
             return
-        self._writer, self._rospec, self._running, self._keepalive_s = writer, 0, False, 0.0
-        reports = asyncio.create_task(self._report(writer))
+        self._writer, self._rospec, self._keepalive_s = writer, None, 0.0
+        self._events = set()
         keepalives = asyncio.create_task(self._keep_alive(writer))
         parser = FrameParser()
         try:
@@ -99,9 +128,9 @@ class LlrpEmulator:
                     for message in parser.feed(data):
                         self._answer(message, writer)
         finally:
-            reports.cancel()
+            self._stop()
             keepalives.cancel()
-            await asyncio.gather(reports, keepalives, return_exceptions=True)
+            await asyncio.gather(keepalives, return_exceptions=True)
             self._writer = None
             writer.close()
 
@@ -118,7 +147,9 @@ class LlrpEmulator:
         if message.name in self.fail or not self._obey(message):
             parts = (Parameter("LLRPStatus", {"StatusCode": 101, "ErrorDescription": f"{message.name} fails"}),)
         elif message.name == "GET_READER_CAPABILITIES":
-            parts += _CAPABILITIES
+            parts += CAPABILITIES
+        elif message.name == "GET_READER_CONFIG":
+            parts += self._antenna_properties()
         versions: dict[str, Value] = {"CurrentVersion": 1, "SupportedVersion": 1}
         values = versions if message.name == "GET_SUPPORTED_VERSION" else {}
         name = "CLOSE_CONNECTION_RESPONSE" if message.name == "CLOSE_CONNECTION" else f"{message.name}_RESPONSE"
@@ -128,32 +159,77 @@ class LlrpEmulator:
 
     def _obey(self, message: Message) -> bool:
         """Change what the reader does; False for a command that makes no sense now."""
-        if message.name == "SET_READER_CONFIG" and (spec := message.find("KeepaliveSpec")):
-            self._keepalive_s = spec.number("PeriodicTriggerValue") / 1000
-        if message.name == "ADD_ROSPEC" and (rospec := message.find("ROSpec")):
-            self._rospec = rospec.number("ROSpecID")
-            boundary = rospec.find("ROBoundarySpec")
-            trigger = boundary.find("ROSpecStartTrigger") if boundary else None
-            self._immediate = trigger is not None and trigger.number("ROSpecStartTriggerType") == 1
+        if message.name == "SET_READER_CONFIG":
+            self._configure(message)
+        elif message.name == "ADD_ROSPEC" and (rospec := message.find("ROSpec")):
+            self._rospec = RoSpec.of(rospec)
         elif message.name in _ROSPEC_COMMANDS:
             wanted = message.number("ROSpecID")
-            if wanted not in (0, self._rospec):
+            if wanted and (self._rospec is None or wanted != self._rospec.id):
                 return False
-            if message.name == "START_ROSPEC" or (message.name == "ENABLE_ROSPEC" and self._immediate):
-                self._running = True
+            if self._rospec and (
+                message.name == "START_ROSPEC" or (message.name == "ENABLE_ROSPEC" and self._rospec.starts_itself)
+            ):
+                self._start(self._rospec)
             elif message.name != "ENABLE_ROSPEC":
-                self._running = False
+                self._stop()
             if message.name == "DELETE_ROSPEC":
-                self._rospec = 0
+                self._rospec = None
         return True
 
-    async def _report(self, writer: asyncio.StreamWriter) -> None:
-        while True:
-            await asyncio.sleep(self._period_s)
-            if self._running and self.tags and not self.silent:
-                now = self._utc()
-                reads = [dataclasses.replace(tag, first_seen=now, last_seen=now) for tag in self.tags.values()]
-                writer.write(encode(messages.report(reads)))
+    def _configure(self, message: Message) -> None:
+        if spec := message.find("KeepaliveSpec"):
+            self._keepalive_s = spec.number("PeriodicTriggerValue") / 1000
+        if told := message.find("ReaderEventNotificationSpec"):
+            for state in told.all("EventNotificationState"):
+                change = self._events.add if state.number("NotificationState") & 0x80 else self._events.discard
+                change(state.number("EventType"))
+
+    def _antenna_properties(self) -> tuple[Parameter, ...]:
+        return tuple(
+            Parameter(
+                "AntennaProperties",
+                {"AntennaConnected": 0 if one in self.unplugged else 0x80, "AntennaID": one, "AntennaGain": 0},
+            )
+            for one in range(1, ANTENNAS + 1)
+        )
+
+    def _start(self, rospec: RoSpec) -> None:
+        self._stop()
+        held: list[TagRead] = []
+
+        def report(reads: list[TagRead]) -> None:
+            if self.reports_late:
+                held[:] = reads
+            else:
+                self._report(reads)
+
+        def ended(turn: int) -> None:
+            values: dict[str, Value] = {"EventType": 0, "ROSpecID": rospec.id, "SpecIndex": turn}
+            self._notify(messages.AISPEC_EVENT, Parameter("AISpecEvent", values))
+            self._report(held)
+            held.clear()
+
+        self._running = asyncio.create_task(
+            run(rospec, look=self._look, report=report, ended=ended, step_s=self._period_s)
+        )
+
+    def _stop(self) -> None:
+        if self._running is not None:
+            self._running.cancel()
+        self._running = None
+
+    def _look(self, antennas: tuple[int, ...]) -> list[TagRead]:
+        now = self._utc()
+        return [
+            dataclasses.replace(tag, first_seen=now, last_seen=now)
+            for tag in self.tags.values()
+            if (0 in antennas or tag.antenna in antennas) and tag.antenna not in self.unplugged
+        ]
+
+    def _report(self, reads: list[TagRead]) -> None:
+        if reads and not self.silent:
+            self.inject(encode(messages.report(reads)))
 
     async def _keep_alive(self, writer: asyncio.StreamWriter) -> None:
         number = 0
@@ -162,71 +238,3 @@ class LlrpEmulator:
             if self._keepalive_s and not self.silent:
                 number += 1
                 writer.write(encode(Message("KEEPALIVE", id=number)))
-
-
-_CAPABILITIES = (
-    Parameter(
-        "GeneralDeviceCapabilities",
-        {
-            "MaxNumberOfAntennaSupported": 4,
-            "Flags": 0x4000,  # has a UTC clock
-            "DeviceManufacturerName": 0,
-            "ModelName": 0,
-            "ReaderFirmwareVersion": "emulator",
-        },
-        (Parameter("GPIOCapabilities", {"NumGPIs": 0, "NumGPOs": 0}),),
-    ),
-    Parameter(
-        "LLRPCapabilities",
-        {
-            "Flags": 0,
-            "MaxNumPriorityLevelsSupported": 1,
-            "ClientRequestOpSpecTimeout": 0,
-            "MaxNumROSpecs": 1,
-            "MaxNumSpecsPerROSpec": 1,
-            "MaxNumInventoryParameterSpecsPerAISpec": 1,
-            "MaxNumAccessSpecs": 1,
-            "MaxNumOpSpecsPerAccessSpec": 1,
-        },
-    ),
-    Parameter(
-        "RegulatoryCapabilities",
-        {"CountryCode": 392, "CommunicationsStandard": 0},
-        (
-            Parameter(
-                "UHFBandCapabilities",
-                {},
-                (
-                    Parameter("TransmitPowerLevelTableEntry", {"Index": 1, "TransmitPowerValue": 3000}),
-                    Parameter(
-                        "FrequencyInformation",
-                        {"Hopping": 0},
-                        (Parameter("FixedFrequencyTable", {"Frequency": (916800,)}),),
-                    ),
-                    Parameter(
-                        "C1G2UHFRFModeTable",
-                        {},
-                        (
-                            Parameter(
-                                "C1G2UHFRFModeTableEntry",
-                                {
-                                    "ModeIdentifier": 0,
-                                    "Flags": 0,
-                                    "MValue": 0,
-                                    "ForwardLinkModulation": 0,
-                                    "SpectralMaskIndicator": 0,
-                                    "BDRValue": 40000,
-                                    "PIEValue": 1500,
-                                    "MinTariValue": 6250,
-                                    "MaxTariValue": 25000,
-                                    "StepTariValue": 0,
-                                },
-                            ),
-                        ),
-                    ),
-                ),
-            ),
-        ),
-    ),
-    Parameter("C1G2LLRPCapabilities", {"Flags": 0, "MaxNumSelectFiltersPerQuery": 1}),
-)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 
-from tms_agents.devices.llrp.codec import Message, Parameter
+from tms_agents.devices.llrp.codec import Message, Parameter, Value
 from tms_agents.devices.tags import TagRead
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -52,36 +52,63 @@ _ATTEMPTS = {
 }
 
 
-def set_keepalive(period_ms: int) -> Message:
-    spec = Parameter("KeepaliveSpec", {"KeepaliveTriggerType": 1, "PeriodicTriggerValue": period_ms})
-    return Message("SET_READER_CONFIG", {"ResetToFactoryDefault": 0}, (spec,))
+#: Kinds of events to be told about: the ends of AISpecs, lost reports, antennas pulled and plugged in.
+REPORT_BUFFER_EVENT, READER_EXCEPTION, AISPEC_EVENT, ANTENNA_EVENT = 3, 4, 6, 8
+
+
+def set_config(keepalive_ms: int, events: tuple[int, ...] = ()) -> Message:
+    """Keepalives of that period, and notification of kinds of events."""
+    states = [Parameter("EventNotificationState", {"EventType": kind, "NotificationState": 0x80}) for kind in events]
+    told = [Parameter("ReaderEventNotificationSpec", {}, tuple(states))] if states else []
+    alive = Parameter("KeepaliveSpec", {"KeepaliveTriggerType": 1, "PeriodicTriggerValue": keepalive_ms})
+    return Message("SET_READER_CONFIG", {"ResetToFactoryDefault": 0}, (*told, alive))
+
+
+def get_antenna_properties() -> Message:
+    return Message("GET_READER_CONFIG", {"AntennaID": 0, "RequestedData": 2, "GPIPortNum": 0, "GPOPortNum": 0})
+
+
+def unplugged_antennas(message: Message) -> set[int]:
+    """Antennas that a reader reports as not connected; none where it sees no antenna at all, as it cannot tell then."""
+    connected = {
+        one.number("AntennaID"): bool(one.number("AntennaConnected") & 0x80) for one in message.all("AntennaProperties")
+    }
+    return {antenna for antenna, yes in connected.items() if not yes} if any(connected.values()) else set()
 
 
 def add_rospec(antennas: tuple[int, ...] = (0,)) -> Message:
-    """Read Gen2 tags for ever on ``antennas`` (0: all), report every tag; starts when enabled."""
-    boundary = Parameter(
-        "ROBoundarySpec",
-        {},
-        (
-            Parameter("ROSpecStartTrigger", {"ROSpecStartTriggerType": 1}),
-            Parameter("ROSpecStopTrigger", {"ROSpecStopTriggerType": 0, "DurationTriggerValue": 0}),
-        ),
-    )
-    inventory = Parameter(
-        "AISpec",
-        {"AntennaIDs": antennas},
-        (
-            Parameter("AISpecStopTrigger", {"AISpecStopTriggerType": 0, "DurationTrigger": 0}),
-            Parameter("InventoryParameterSpec", {"InventoryParameterSpecID": 1, "ProtocolID": 1}),
-        ),
-    )
-    report = Parameter(
-        "ROReportSpec",
-        {"ROReportTrigger": 1, "N": 1},
-        (Parameter("TagReportContentSelector", {"Enable": REPORT_CONTENT}),),
-    )
+    """Read Gen2 tags for ever on ``antennas`` (0: all), report every tag at once; starts when enabled."""
+    start = Parameter("ROSpecStartTrigger", {"ROSpecStartTriggerType": 1})
+    return _add_rospec(start, [_aispec(antennas, {"AISpecStopTriggerType": 0, "DurationTrigger": 0})], reads=1)
+
+
+def add_round_rospec(antennas: tuple[int, ...], round_ms: int) -> Message:
+    """Again and again one AISpec of ``round_ms`` per antenna; its tags are reported when it ends.
+
+    ``ROReportTrigger`` 1 with N = 0 means: at the end of each AISpec and not before.
+    """
+    period = Parameter("PeriodicTriggerValue", {"Offset": 0, "Period": len(antennas) * round_ms + _REST_MS})
+    start = Parameter("ROSpecStartTrigger", {"ROSpecStartTriggerType": 2}, (period,))
+    stop: dict[str, Value] = {"AISpecStopTriggerType": 1, "DurationTrigger": round_ms}
+    return _add_rospec(start, [_aispec((antenna,), stop) for antenna in antennas], reads=0)
+
+
+#: Between the end of one ROSpec and its next start, which a reader still busy would leave out.
+_REST_MS = 20
+
+
+def _aispec(antennas: tuple[int, ...], stop: dict[str, Value]) -> Parameter:
+    inventory = Parameter("InventoryParameterSpec", {"InventoryParameterSpecID": 1, "ProtocolID": 1})
+    return Parameter("AISpec", {"AntennaIDs": antennas}, (Parameter("AISpecStopTrigger", stop), inventory))
+
+
+def _add_rospec(start: Parameter, aispecs: list[Parameter], reads: int) -> Message:
+    stop = Parameter("ROSpecStopTrigger", {"ROSpecStopTriggerType": 0, "DurationTriggerValue": 0})
+    boundary = Parameter("ROBoundarySpec", {}, (start, stop))
+    content = Parameter("TagReportContentSelector", {"Enable": REPORT_CONTENT})
+    report = Parameter("ROReportSpec", {"ROReportTrigger": 1, "N": reads}, (content,))
     values = {"ROSpecID": ROSPEC_ID, "Priority": 0, "CurrentState": 0}
-    return Message("ADD_ROSPEC", {}, (Parameter("ROSpec", values, (boundary, inventory, report)),))
+    return Message("ADD_ROSPEC", {}, (Parameter("ROSpec", values, (boundary, *aispecs, report)),))
 
 
 def rospec(command: str, rospec_id: int = ROSPEC_ID) -> Message:
