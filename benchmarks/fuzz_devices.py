@@ -22,16 +22,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from tms_agents.devices.lines import LineParser
-from tms_agents.devices.llrp import messages
-from tms_agents.devices.llrp.codec import MAX_MESSAGE, encode
+from tms_agents.devices.llrp.codec import MAX_MESSAGE
 from tms_agents.devices.llrp.codec import FrameParser as LlrpParser
 from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.loadboard import RosTmsBoardSession
 from tms_agents.devices.modbus import StatusRegister, WeighingMap
 from tms_agents.devices.scales import DialectName, ScaleLineSession
-from tms_agents.devices.tags import TagRead
-from tms_agents.devices.tr3.codec import MAX_FRAME, command_mode, inventory, select_antenna
-from tms_agents.devices.tr3.codec import Frame as Tr3Frame
+from tms_agents.devices.tr3.codec import MAX_FRAME
 from tms_agents.devices.tr3.codec import FrameParser as Tr3Parser
 from tms_agents.devices.tr3.session import Tr3Session
 from tms_agents.devices.transport import DeviceFault, Session
@@ -91,23 +88,31 @@ def _session(
     return target
 
 
-_UID = bytes.fromhex("00 7AF9174E000104E0")
-_TR3 = [frame.encode() for frame in (command_mode(), select_antenna(1), inventory())] + [
-    Tr3Frame(0x30, b"\xf0\x02").encode() + Tr3Frame(0x49, _UID).encode() * 2,
-    Tr3Frame(0x31, b"\x44").encode(),
-    Tr3Frame(0x4C, _UID[1:] + bytes(16)).encode(),
-    Tr3Frame(0x30, b"\x9c\x01").encode(),
-    Tr3Frame(0x30).encode(),
+_TR3 = [
+    bytes.fromhex(text)
+    for text in (
+        "02004E040000001C03730D",  # command mode
+        "02004E029C0103F20D",  # antenna 1
+        "02007803F0000103710D",  # inventory
+        "02003000 03350D",
+        "020030029C0103D40D",
+        "02003002F00203290D 0200490900 7AF9174E000104E0 03140D 0200490900 7AF9174E000104E0 03140D",
+        "020031014403 7B0D",
+        "02004C18 C8FF4787500104E01A20F26106B1BAAE0000000000000000 03DF0D",
+    )
 ]
-_EPC = "3005FB63AC1F3841EC880467"
 _LLRP = [
-    encode(messages.set_keepalive(3000)),
-    encode(messages.add_rospec((1,))),
-    encode(messages.rospec("ENABLE")),
-    encode(messages.report([TagRead(tag=_EPC, antenna=1, rssi_dbm=-50.0), TagRead(tag=_EPC, antenna=2)])),
-    bytes.fromhex("043f000000200ab288c900f600160080000c0004f8535baadaff010000060000"),
-    bytes.fromhex("041f0000001200000004011f000800000000"),
-    bytes.fromhex("043d0000002c4095892f00f000228d3005fb63ac1f3841ec880467810001 86ce820004ec2ea8354c09880001"),
+    bytes.fromhex(text)
+    for text in (
+        "040300000014000000030000dc00090100002710",  # keepalive every 10 s
+        "04140000004b0000000500b1004100000001000000b2001200b300050100b60009000000000000b700180001000000b80009"
+        "000000000000ba000700010100ed000d01000100ee00061780",  # add a ROSpec
+        "04180000000e0000000600000001",  # enable it
+        "043f000000200ab288c900f600160080000c0004f8535baadaff010000060000",  # the reader's greeting
+        "041f0000001200000004011f000800000000",  # success
+        "043d0000002c4095892f00f000228d3005fb63ac1f3841ec88046781000186ce820004ec2ea8354c09880001",  # a tag
+        "043e0000000a00000008",  # keepalive
+    )
 ]
 _BOARD = [b"246\r\n", b'"-17"OK\r\n', b"OK\r\n8388607\r\n", b"0\n"]
 _SCALES: dict[DialectName, list[bytes]] = {

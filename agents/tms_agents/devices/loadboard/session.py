@@ -139,9 +139,7 @@ class RosTmsBoardSession:
         if not line.strip() or self._draining:
             return
         if self._asked is None:
-            self.doubtful_rounds += bool(self._open_round or self._done)
-            self._done.clear()
-            self._round, self._open_round, self._draining = [], False, True
+            self._drop()
         elif number is None:
             self._miss(now)
         else:
@@ -160,7 +158,15 @@ class RosTmsBoardSession:
         self._asked, self._draining = None, True
         self._heard_at, self._looks = now, 0
 
+    def _drop(self) -> None:
+        self.doubtful_rounds += bool(self._open_round or self._done)
+        self._done.clear()
+        self._round, self._open_round, self._draining = [], False, True
+
     def _finish(self) -> None:
+        if self._lines.pending:  # the beginning of a line that nobody asked for
+            self._drop()
+            return
         self._open_round = False
         dead = [str(cell) for cell, misses in enumerate(self._misses) if misses >= _MISSES]
         fault = f"no answer from cell {', '.join(dead)}" if dead else ""

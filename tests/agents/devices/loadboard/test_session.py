@@ -81,13 +81,14 @@ def test_an_answer_too_late_even_for_the_pause_spoils_its_round_only():
     assert wire.session.doubtful_rounds >= 1
 
 
-def test_a_line_left_over_after_the_round_drops_it_too():
+@pytest.mark.parametrize("left_over", [b"4321\r\n", b"43"])
+def test_a_line_left_over_after_the_round_drops_it_too(left_over):
     wire = Wire()
     wire.run(0.5)
-    while wire.session._asked is not None or wire.session._open_round:
+    while wire.session._asked is not None or not wire.session._open_round:
         wire.run(0.001)
     assert wire.session.doubtful_rounds == 0
-    wire.noise = b"4321\r\n"
+    wire.noise = left_over
     samples = wire.run(0.05)
     assert samples == [] and wire.session.doubtful_rounds == 1
     assert right(wire.run(0.5))
