@@ -53,7 +53,7 @@ class AgentConfig(Section):
     spool: SpoolSection
 
 
-C = TypeVar("C", bound=AgentConfig)
+C = TypeVar("C", bound=Section)
 
 
 def read_config(path: Path, model: type[C]) -> C:

@@ -1,0 +1,1 @@
+"""Intake at the cabinet: scan the barcode, hold the thing at the reader, done."""
