@@ -110,8 +110,10 @@ def events(pool: ProcessPoolExecutor, changes: int) -> None:
     ]
     scores = dict(zip(jobs, pool.map(judged, jobs), strict=True))
     print("Events, mean and standard deviation over five seeds\n")
-    print("| scene | changes | by | precision | recall | single: precision, recall | two at once: precision, recall |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| scene | changes | by | precision | recall | single: precision, recall | two at once: precision, recall "
+        "| in place | named | phantoms |\n|---|---|---|---|---|---|---|---|---|---|"
+    )
     for scene in [*SCENES, *UNSEEN]:
         for name in CONTESTANTS:
             mine = [score for job, score in scores.items() if (job.scene, job.contestant) == (scene, name)]
@@ -122,7 +124,10 @@ def events(pool: ProcessPoolExecutor, changes: int) -> None:
                 f"| {_spread([s.precision(None, 'single') for s in mine])}, "
                 f"{_spread([s.recall(None, 'single') for s in mine])} "
                 f"| {_spread([s.precision(None, 'pair') for s in mine])}, "
-                f"{_spread([s.recall(None, 'pair') for s in mine])} |",
+                f"{_spread([s.recall(None, 'pair') for s in mine])} "
+                f"| {_spread([s.placed / max(s.things, 1) for s in mine])} "
+                f"| {_spread([s.named / max(s.tagged, 1) for s in mine])} "
+                f"| {_spread([s.phantoms / max(s.things, 1) for s in mine])} |",
                 flush=True,
             )
     for title, scenes in (("known", ["cabinet"]), ("unseen", list(UNSEEN))):
@@ -169,6 +174,10 @@ def look(job: Job) -> None:
     for situation in ("single", "pair"):
         precision, recall = scores.precision(None, situation), scores.recall(None, situation)
         print(f"{situation}: precision {precision:.3f}, recall {recall:.3f}")
+    print(
+        f"of {scores.things} things at rest {scores.placed} in place, of {scores.tagged} tagged ones {scores.named} "
+        f"named, {scores.phantoms} phantoms"
+    )
 
 
 def _spread(values: list[float]) -> str:

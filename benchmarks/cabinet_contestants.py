@@ -39,8 +39,8 @@ class Contestant(Protocol):
 
     def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[Detection]: ...
 
-    def position_now(self, stay: str) -> Xy | None:
-        """Where it holds the stay to be by now."""
+    def standing(self) -> dict[str, tuple[Xy, str | None]]:
+        """What it holds to be on the board by now: position and tag of each stay."""
 
 
 class Ours:
@@ -58,8 +58,8 @@ class Ours:
     def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[Detection]:
         return _detections(t, self._estimator.inventory(t, zone, tags))
 
-    def position_now(self, stay: str) -> Xy | None:
-        return next((one.xy for one in self._estimator.stays() if str(one.id) == stay), None)
+    def standing(self) -> dict[str, tuple[Xy, str | None]]:
+        return {str(one.id): (one.xy, one.tag) for one in self._estimator.stays()}
 
 
 class Laboratory:
@@ -83,8 +83,9 @@ class Laboratory:
         self._cabinet.inventory(tags)
         return []
 
-    def position_now(self, stay: str) -> Xy | None:
-        return self._xy.get(stay)
+    def standing(self) -> dict[str, tuple[Xy, str | None]]:
+        """Each thing where its own last event was; the published program showed all at the last event of any."""
+        return {tag: (self._xy[tag], tag) for tag in self._cabinet.inside}
 
 
 def _detections(at: float, events: list[CabinetEvent]) -> list[Detection]:

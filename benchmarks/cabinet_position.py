@@ -51,13 +51,15 @@ def precision(
         said = _play(world, cabinet, settling)
         first = next((one for one in said if one.kind == "in" and one.xy is not None and one.at >= change.start), None)
         if first is not None and first.xy is not None:
-            late = cabinet.position_now(first.stay)
+            late = cabinet.standing().get(first.stay)
             limits = [
                 _limit(world, weight, xy, (empty_since, change.start), (change.stable, until))
                 for until in (max(first.at, change.stable + 0.2), change.stable + LATE_S)
             ]
             error = math.dist(first.xy, xy)
-            squares.append((error**2, limits[0] ** 2, math.dist(late, xy) ** 2 if late else math.nan, limits[1] ** 2))
+            squares.append(
+                (error**2, limits[0] ** 2, math.dist(late[0], xy) ** 2 if late else math.nan, limits[1] ** 2)
+            )
         _play(world, cabinet, world.run(1.0))
         out = world.take(f"thing{trial}")
         _play(world, cabinet, world.run(out.stable - world.time_s + 2.0))

@@ -40,6 +40,13 @@ class Scores:
     unpinned: int = 0  # of the found: declared as one load over several stays, position not asked for
     reentered: int = 0  # lifted moves that were told as out and in
     untagged: int = 0  # of the missed "in": no tag
+    #: At the end of every rest: things on the board, of these in their places, of the tagged ones there also named,
+    #: and stays without a thing.
+    things: int = 0
+    placed: int = 0
+    tagged: int = 0
+    named: int = 0
+    phantoms: int = 0
     latency_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     examples: list[str] = field(default_factory=list)
 
@@ -50,6 +57,8 @@ class Scores:
         self.unpinned += other.unpinned
         self.reentered += other.reentered
         self.untagged += other.untagged
+        for count in ("things", "placed", "tagged", "named", "phantoms"):
+            setattr(self, count, getattr(self, count) + getattr(other, count))
         for kind, values in other.latency_s.items():
             self.latency_s[kind] += values
         self.examples += other.examples
@@ -87,6 +96,7 @@ class Referee:
         self._ins([change for change in changes if change.kind == "in"] + lifted)
         self._identities(episode)
         self._leftovers(changes)
+        self._compare()
 
     def _refine(self) -> None:
         """A stay that appeared and was then told more precisely stands where it was told last."""
@@ -191,6 +201,25 @@ class Referee:
                 continue  # also what is told on the way
             self.scores.false[self._situation, one.kind] += 1
             self._example(f"{self._situation}: false {one.kind} of stay {one.stay} ({name}) at {one.at:.2f} {one.xy}")
+
+    def _compare(self) -> None:
+        """What stands on the board with what the contestant holds to stand there, nearest first."""
+        stays = self._contestant.standing()
+        pairs = sorted(
+            (math.dist(thing.xy, xy), name, stay)
+            for name, thing in self._on_board.items()
+            for stay, (xy, _) in stays.items()
+        )
+        left = dict(self._on_board)
+        for apart, name, stay in pairs:
+            if name in left and stay in stays and apart <= position_gate(self._world, left[name]):
+                thing = left.pop(name)
+                _, tag = stays.pop(stay)
+                self.scores.placed += 1
+                self.scores.named += thing.tag is not None and tag == thing.tag
+        self.scores.things += len(self._on_board)
+        self.scores.tagged += sum(thing.tag is not None for thing in self._on_board.values())
+        self.scores.phantoms += len(stays)
 
     def _note(self, change: Change, kind: str, one: Detection | None, due: float) -> None:
         if one is None:

@@ -74,6 +74,11 @@ class LaboratoryCabinet:
         self._baseline = average
         return self._cycle(t, difference)
 
+    @property
+    def inside(self) -> tuple[str, ...]:
+        """Tags of what it holds to be inside."""
+        return tuple(self._inside)
+
     def _cycle(self, t: float, difference: Floats | None) -> list[Told]:
         told = self._tags(t)
         if difference is not None:
