@@ -14,7 +14,7 @@ from tms_agents.devices.lines import LineParser
 from tms_agents.devices.scales.dialects import GRAMS
 from tms_agents.devices.scales.parity import add_even_parity, strip_even_parity
 
-#: The pan has come to rest when it changed by less than this in the time before.
+#: The pan has come to rest when what was weighed in this time differs by less than that.
 _STILL_G, _STILL_S = 0.5, 0.3
 
 
@@ -46,6 +46,7 @@ class Scale(ABC):
         self._parity, self._clock = software_parity, clock
         self._lines = LineParser()
         self._tare_g = 0.0
+        self._weighed: deque[tuple[float, float]] = deque(maxlen=1000)
         self._streaming = False
         self._next_at = self._booted_at = clock()
 
@@ -84,12 +85,16 @@ class Scale(ABC):
 
     @property
     def _gross_g(self) -> float:
-        return self._grams(self._clock())
+        now = self._clock()
+        self._weighed.append((now, self._grams(now)))
+        while self._weighed[0][0] < now - _STILL_S:
+            self._weighed.popleft()
+        return self._weighed[-1][1]
 
     @property
     def _stable(self) -> bool:
-        now = self._clock()
-        return abs(self._grams(now) - self._grams(now - _STILL_S)) < _STILL_G
+        now = self._gross_g
+        return all(abs(then - now) < _STILL_G for _, then in self._weighed)
 
     @property
     def _value(self) -> float:
@@ -188,6 +193,7 @@ class OpenScale(Scale):
     timestamp, raw, local_c, remote_c = True, False, True, True
     firmware = "1.2"
     trigger = ""
+    _booting = False
 
     def power_cycle(self) -> None:
         super().power_cycle()
@@ -195,7 +201,7 @@ class OpenScale(Scale):
 
     def tick(self) -> bytes:
         self._streaming = not self.trigger
-        if getattr(self, "_booting", False) and self._clock() >= self._booted_at:
+        if self._booting and self._clock() >= self._booted_at:
             self._booting = False
             return self._wire(_BANNER)
         return super().tick()
