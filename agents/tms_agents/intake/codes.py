@@ -1,6 +1,6 @@
 """What a scanner, a reader in keyboard mode or a person types: a barcode, a tag, or other text.
 
-Formats: GS1 General Specifications (check digit, AI 01), AIM symbology identifiers, GS1 Tag Data Standard (SGTIN-96).
+Formats: see ``devices.scanner``; GS1 Digital Link; GS1 Tag Data Standard (SGTIN-96).
 """
 
 from __future__ import annotations
@@ -8,10 +8,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-_AIM = re.compile(r"\][A-Za-z][0-9A-Za-z]")
+from tms_agents.devices.scanner import check_digit, product_code
+
 _DIGITS = re.compile(r"[0-9]{8}|[0-9]{12,14}")
-#: Element string of a carton or a 2D code: AI 01, then the GTIN in 14 digits; also as a GS1 Digital Link.
-_ELEMENT = re.compile(r"\(?01\)?([0-9]{14})|https?://\S+/01/([0-9]{8,14})(?:[/?#]|$)")
+#: GS1 Digital Link, as QR codes on things carry it.
+_LINK = re.compile(r"https?://\S+/01/([0-9]{8,14})(?:[/?#]|$)")
 _HEX_TAG = re.compile(r"(?:[0-9A-F]{2}){4,32}")
 _ANY_TAG = re.compile(r"[A-Z0-9._:-]{1,64}")
 _TAG_PREFIX = re.compile(r"tag:\s*", re.IGNORECASE)
@@ -45,17 +46,15 @@ class Unusable:
 
 def barcode(code: str) -> Barcode | Unusable:
     """What a scanner delivered, with or without its AIM identifier."""
-    bare = _AIM.sub("", code.strip(), count=1) if code.lstrip().startswith("]") else code.strip()
-    # No bare number is that long.
-    if len(bare) > 14 and (element := _ELEMENT.match(bare)):
-        bare = next(part for part in element.groups() if part)
-    if not _DIGITS.fullmatch(bare):
-        return Unusable(
-            f"{_short(bare)} is no product barcode (JAN, EAN, UPC: 8, 12, 13 or 14 digits); scan another one."
-        )
-    if not right_check_digit(bare):
+    code = code.strip()
+    link = _LINK.match(code)
+    digits = product_code(link[1] if link else code)
+    if digits is not None:
+        return Barcode(digits)
+    bare = re.sub(r"^\][A-Za-z][0-9A-Za-z]", "", code)
+    if _DIGITS.fullmatch(bare):
         return Unusable(f"{bare} was read wrongly (its check digit does not fit); scan it again.")
-    return Barcode(bare)
+    return Unusable(f"{_short(bare)} is no product barcode (JAN, EAN, UPC: 8, 12, 13 or 14 digits); scan another one.")
 
 
 def typed(line: str) -> Barcode | TagId | Text | Unusable:
@@ -82,12 +81,6 @@ def tag_id(text: str) -> TagId | Unusable:
     if _ANY_TAG.fullmatch(tag):
         return TagId(tag)
     return Unusable(f"{_short(text)} is no tag: letters, digits and . _ : - only, at most 64.")
-
-
-def right_check_digit(digits: str) -> bool:
-    """Weights 3, 1, 3 ... from the right, without the last digit."""
-    total = sum(int(digit) * (3 if i % 2 == 0 else 1) for i, digit in enumerate(reversed(digits[:-1])))
-    return -total % 10 == int(digits[-1])
 
 
 #: Partition -> (bits, digits) of the company prefix and (bits, digits) of indicator and item.
@@ -118,8 +111,8 @@ def sgtin_96(tag: str) -> str | None:
     item = f"{bits >> 38 & (1 << item_bits) - 1:0{item_digits}d}"
     if len(company) > company_digits or len(item) > item_digits:
         return None
-    payload = item[0] + company + item[1:]
-    gtin = next(payload + digit for digit in "0123456789" if right_check_digit(payload + digit))
+    gtin = item[0] + company + item[1:]
+    gtin += check_digit(gtin)
     return gtin[1:] if gtin[0] == "0" else gtin
 
 

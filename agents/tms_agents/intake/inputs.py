@@ -9,6 +9,7 @@ from collections.abc import AsyncGenerator, AsyncIterator, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
+from tms_agents.devices.scanner import Scan
 from tms_agents.devices.transport import DeviceState
 from tms_agents.intake.scanners import ScannerSource, open_scanner
 from tms_agents.readers import ReaderSource, Seen, open_reader
@@ -126,14 +127,14 @@ async def scanner(source: ScannerSource) -> AsyncGenerator[Input, None]:
                 yield Device("scanner", arrived)
                 continue
             for one in arrived:
-                yield Scanned(one.code)
+                yield Scanned(one.code if isinstance(one, Scan) else one.text)
 
 
 async def _some(fd: int) -> bytes:
     loop = asyncio.get_running_loop()
     ready = loop.create_future()
     try:
-        loop.add_reader(fd, lambda: ready.done() or ready.set_result(None))
+        loop.add_reader(fd, _set, ready)
     except PermissionError:  # a file: always ready
         ready.set_result(None)
     try:
@@ -145,6 +146,11 @@ async def _some(fd: int) -> bytes:
         return os.read(fd, 4096)
     except OSError:  # the terminal was closed
         return b""
+
+
+def _set(ready: asyncio.Future[None]) -> None:
+    if not ready.done():
+        ready.set_result(None)
 
 
 async def _ticks() -> AsyncGenerator[Input, None]:

@@ -9,14 +9,16 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tms_agents.config import Section
-from tms_agents.devices.lines import LineParser
+from tms_agents.devices.scanner import Scan, ScannerSession
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
 from tms_agents.readers import Port
 
 
 @dataclass(frozen=True, slots=True)
-class Scan:
-    code: str
+class Misread:
+    """A line that is no product code, or one that was read wrongly."""
+
+    text: str
 
 
 class SerialScanner(Section):
@@ -38,30 +40,40 @@ class TcpScanner(Section):
 ScannerSource = Annotated[SerialScanner | TcpScanner, Field(discriminator="kind")]
 
 
-def open_scanner(source: SerialScanner | TcpScanner) -> AsyncGenerator[Sequence[Scan] | DeviceState, None]:
+def open_scanner(
+    source: SerialScanner | TcpScanner,
+) -> AsyncGenerator[Sequence[Scan | Misread] | DeviceState, None]:
+    """Listen to a scanner for ever, through every failure of it."""
     if isinstance(source, SerialScanner):
         opener, name = serial(source.device, source.baud), f"scanner {source.device}"
     else:
         opener, name = tcp(source.host, source.port), f"scanner {source.host}:{source.port}"
-    # Nothing comes until somebody scans: silence is no sign of a fault.
-    return Link(opener, _Lines, name=name, silent_after_s=1e9, tick_s=0.05).listen()
+    return Link(opener, _Session, name=name, tick_s=0.05).listen()
 
 
-class _Lines:
+class _Session:
+    """``ScannerSession`` that tells what it refused: whoever scans wants to know."""
+
+    ready = True
+
     def __init__(self) -> None:
-        self.frames, self.ready = 0, True
-        self._parser = LineParser()
+        self._scanner = ScannerSession()
+
+    @property
+    def frames(self) -> int:
+        return self._scanner.frames
 
     def opened(self) -> None:
-        pass
+        self._scanner.opened()
 
-    def receive(self, data: bytes) -> Sequence[Scan]:
-        lines = self._parser.feed(data)
-        self.frames += len(lines)
-        return [Scan(line.decode("ascii", "replace")) for line in lines]
+    def receive(self, data: bytes) -> list[Scan | Misread]:
+        before = self._scanner.refusals
+        scans: list[Scan | Misread] = [*self._scanner.receive(data)]
+        # Behind the scans of the same bytes: whichever came first, then none of them is kept.
+        return [*scans, Misread(self._scanner.refused)] if self._scanner.refusals > before else scans
 
     def tick(self) -> None:
-        pass
+        self._scanner.tick()
 
     def output(self) -> bytes:
         return b""

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tms_agents.intake.codes import Barcode, TagId, Text, Unusable, barcode, right_check_digit, sgtin_96, tag_id, typed
-from tms_server.objects.gtin import gtin_of_epc
+from tms_agents.intake.codes import Barcode, TagId, Text, Unusable, barcode, sgtin_96, tag_id, typed
+from tms_server.objects.gtin import canonical_gtin, gtin_of_epc
 
 JAN = "4901777018686"
 
@@ -74,7 +74,7 @@ def test_lines_that_are_wrong(line, part):
 def test_any_text_is_something(text):
     for found in (typed(text), barcode(text), tag_id(text)):
         if isinstance(found, Barcode):
-            assert right_check_digit(found.digits)
+            assert canonical_gtin(found.digits)
         if isinstance(found, TagId):
             assert 1 <= len(found.tag) <= 64 and found.tag == found.tag.upper()
 
