@@ -102,6 +102,12 @@ class Grasp:
         self.phase, self.told, self.tag, self._unsure = "holding", True, tag, True
         self._fingers.closed = True
 
+    def adopt(self, t: float, tag: str | None) -> None:
+        """What the hand holds was told already, with this tag: it came from another hand."""
+        self.told, self.tag = True, tag
+        self._last_read, self._hits, self._misses = t, 0, 0
+        self._last_told = None
+
     def forget(self) -> None:
         """What was told to be in this hand is told by another one."""
         self.told, self.tag = False, None

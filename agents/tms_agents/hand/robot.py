@@ -19,7 +19,7 @@ from tms_agents.hand.posture import Posture
 from tms_agents.hand.settings import GraspSettings
 from tms_agents.hand.states import GripperMessage, StateMessage
 from tms_agents.hand.surfaces import Surfaces
-from tms_client.grasping import Gripper, Held, Table
+from tms_client.grasping import Gripper, Table
 from tms_schemas.events import Placed
 from tms_schemas.observation import (
     Inventory,
@@ -43,8 +43,8 @@ class _Hand:
     gripper: Gripper
     #: The last message about it: what a message leaves out is as before.
     said: GripperMessage | None = None
-    #: It closed on what another hand holds: told when that one lets go, or when the two part.
-    shared: tuple[str, Grasped] | None = None
+    #: The hand whose thing this one closed on: told when that one lets go, or when the two part.
+    shares: str | None = None
 
 
 class Robot:
@@ -87,7 +87,11 @@ class Robot:
             hand.grasp.but = self._tags_elsewhere(name)
             if hand.said is not None:
                 spot = self._posture.spot(name, hand.said)
-                found += self._tell(name, at, hand.grasp.grip(at.timestamp(), _grip(hand.said), spot))
+                before = hand.grasp.phase
+                events = hand.grasp.grip(at.timestamp(), _grip(hand.said), spot)
+                if hand.grasp.phase == "holding" and before in ("closed", "empty"):
+                    hand.shares = self._giver(name)
+                found += self._tell(name, at, events)
         return found + self._part(at)
 
     def read(self, hand: str, at: datetime, tag: str) -> list[Observation]:
@@ -163,19 +167,14 @@ class Robot:
     def _one(self, name: str, at: datetime, event: GraspEvent) -> list[Observation]:
         hand = self._hands[name]
         gripper, when = hand.gripper, datetime.fromtimestamp(event.at, at.tzinfo)
-        if hand.shared is not None and not self._splits(name, event):
-            if isinstance(event, Released | Dropped):
-                hand.shared = None
-            return []
         before: list[Observation] = []
-        if hand.shared is not None:
-            before = self._own(name, at)
+        if hand.shares is not None:
+            if not self._splits(hand, event):
+                return []
+            before = self._own(hand, at)
         match event:
             case Grasped(spot=spot, tag=tag):
-                if (other := self._same_thing(name, event)) is not None:
-                    hand.shared = (other, event)
-                    return []
-                return gripper.grasped(when, spot.xy, tag=tag, z=spot.z, cov=spot.cov)
+                return before + gripper.grasped(when, spot.xy, tag=tag, z=spot.z, cov=spot.cov)
             case Identified(tag=tag):
                 return before + gripper.read(when, tag)
             case Unread():
@@ -183,7 +182,7 @@ class Robot:
             case Carried(spot=spot):
                 return before + gripper.moved(when, spot.xy, spot.z, spot.cov)
             case Released() | Dropped() if (taker := self._taker(name)) is not None:
-                return self._pass_on(name, taker, at)
+                return self._pass_on(hand, taker, at)
             case Released(spot=spot):
                 below = self.surfaces.under(spot)
                 if below.onto == "person":
@@ -204,59 +203,58 @@ class Robot:
 
     # two hands, one thing
 
-    def _same_thing(self, name: str, grasped: Grasped) -> str | None:
-        """The other hand that may hold the thing that this one closed on."""
+    def _giver(self, name: str) -> str | None:
+        """The hand whose thing this one has just closed on."""
+        own = self._hands[name].grasp.spot
         for other, hand in self._hands.items():
-            held = hand.gripper.held
-            if other == name or held is None or hand.shared is not None:
+            if other == name or hand.gripper.held is None or own is None or hand.grasp.spot is None:
                 continue
-            if grasped.tag not in (None, hand.grasp.tag) and hand.grasp.tag is not None:
-                continue
-            if hand.grasp.spot is not None and gap(hand.grasp.spot, grasped.spot) <= _TOGETHER_M:
+            if gap(own, hand.grasp.spot) <= _TOGETHER_M:
                 return other
         return None
 
-    def _splits(self, name: str, event: GraspEvent) -> bool:
-        """The event shows that this hand holds a thing of its own."""
-        shared = self._hands[name].shared
-        tag = None if shared is None else self._hands[shared[0]].grasp.tag
-        return isinstance(event, Identified) and tag is not None and event.tag != tag
+    def _splits(self, hand: _Hand, event: GraspEvent) -> bool:
+        """The event shows that this hand holds a thing of its own, with another tag."""
+        assert hand.shares is not None
+        tag = self._hands[hand.shares].grasp.tag
+        return isinstance(event, Grasped | Identified) and None not in (tag, event.tag) and event.tag != tag
 
-    def _taker(self, giver: str) -> str | None:
+    def _taker(self, giver: str) -> _Hand | None:
         """The hand that has closed on what this one lets go."""
-        return next((name for name, one in self._hands.items() if one.shared and one.shared[0] == giver), None)
+        return next((one for one in self._hands.values() if one.shares == giver), None)
 
-    def _pass_on(self, giver: str, taker: str, at: datetime) -> list[Observation]:
+    def _pass_on(self, giver: _Hand, taker: _Hand, at: datetime) -> list[Observation]:
         """From one hand to the other: a transfer, so that the object goes along whatever it is."""
-        source, target = self._hands[giver], self._hands[taker]
-        held, (_, grasped) = source.gripper.held, target.shared or (giver, None)
-        target.shared, source.gripper.held = None, None
-        if held is None or grasped is None:
+        held, spot = giver.gripper.held, taker.grasp.spot
+        taker.shares, giver.gripper.held = None, None
+        if held is None:
             return []
-        spot = target.grasp.spot or grasped.spot
-        new = held.model_copy(update={"label": self._new_label(), "xy": spot.xy, "z": spot.z})
-        target.gripper.held = Held.model_validate(new.model_dump())
-        place = Placed(xy=spot.xy, z=spot.z, cov=spot.cov).model_dump(exclude_none=True)
+        xy, z, cov = (held.xy, held.z, None) if spot is None else (spot.xy, spot.z, spot.cov)
+        new = held.model_copy(update={"label": self._new_label(), "xy": xy, "z": z})
+        taker.gripper.held = new
+        taker.grasp.adopt(at.timestamp(), new.tag)
+        place = Placed(xy=xy, z=z, cov=cov).model_dump(exclude_none=True)
         return [Transfer(seq=0, observed_at=at, from_=held.label, to=new.label, kind="robot", **place)]
 
     def _part(self, at: datetime) -> list[Observation]:
-        """Hands that went apart while both are closed hold two things."""
+        """Hands that went apart while both are closed hold two things; a hand that opened shares nothing."""
         found: list[Observation] = []
-        for name, hand in self._hands.items():
-            if hand.shared is None:
+        for hand in self._hands.values():
+            if hand.shares is None:
                 continue
-            other = self._hands[hand.shared[0]]
-            apart = gap(hand.grasp.spot, other.grasp.spot) > _APART_M
-            if apart or other.gripper.held is None:
-                found += self._own(name, at)
+            giver = self._hands[hand.shares]
+            if hand.grasp.phase not in ("holding", "opened"):
+                hand.shares = None
+            elif giver.gripper.held is None or gap(hand.grasp.spot, giver.grasp.spot) > _APART_M:
+                found += self._own(hand, at)
         return found
 
-    def _own(self, name: str, at: datetime) -> list[Observation]:
+    def _own(self, hand: _Hand, at: datetime) -> list[Observation]:
         """What this hand closed on is a thing of its own after all."""
-        hand = self._hands[name]
-        assert hand.shared is not None
-        grasped, hand.shared = hand.shared[1], None
-        spot = hand.grasp.spot or grasped.spot
+        hand.shares = None
+        spot = hand.grasp.spot
+        if not hand.grasp.told or spot is None:  # then it is told when it is lifted
+            return []
         return hand.gripper.grasped(at, spot.xy, tag=hand.grasp.tag, z=spot.z, cov=spot.cov)
 
     def _tags_elsewhere(self, name: str) -> frozenset[str]:

@@ -55,7 +55,7 @@ class Surfaces:
             found = [
                 (surface.z, piece, surface)
                 for piece in self._furniture
-                for surface in piece.surfaces or [Surface(id="-", polygon=piece.polygon)]
+                for surface in piece.surfaces or [Surface(id="whole", polygon=piece.polygon)]
                 if distance_outside(spot.xy, surface.polygon) <= margin and self._within(spot, piece, surface)
             ]
             if found:
