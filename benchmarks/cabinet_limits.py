@@ -23,12 +23,12 @@ def position_limit(shares: Floats, weight_g: float, xy: tuple[float, float], var
     return float(np.sqrt(covariance[1, 1] + covariance[2, 2]))
 
 
-def difference_variance(
-    noise_sd_g: Floats, before: NDArray[np.bool_], after: NDArray[np.bool_], step_g: float
-) -> float:
-    """Least variance of (level after - level before) of a cell whose samples have deviations ``noise_sd_g`` (n,).
+def difference_variance(noise_sd_g: Floats, load: Floats, before: NDArray[np.bool_], step_g: float) -> float:
+    """Least variance of what a cell's level after a change differs by from that of the samples ``before`` it.
 
-    Rounding to ``step_g`` counts as uniform noise; samples are weighted by what each is worth.
+    ``noise_sd_g`` (n,) of the samples, which rounding to ``step_g`` adds to as uniform noise. All samples count by what
+    they are worth; those after the change also by ``load`` (n,), the force on the place in units of the final weight:
+    while a hand puts a thing down its force is unknown, but it acts where the thing is going to stand.
     """
     worth = 1.0 / (noise_sd_g**2 + step_g**2 / 12)
-    return float(1.0 / worth[before].sum() + 1.0 / worth[after].sum())
+    return float(1.0 / worth[before].sum() + 1.0 / (worth * load**2)[~before].sum())

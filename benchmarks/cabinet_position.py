@@ -53,8 +53,8 @@ def precision(
         if first is not None and first.xy is not None:
             late = cabinet.standing().get(first.stay)
             limits = [
-                _limit(world, weight, xy, (empty_since, change.start), (change.stable, until))
-                for until in (max(first.at, change.stable + 0.2), change.stable + LATE_S)
+                _limit(world, change.name, empty_since, change.start, until)
+                for until in (max(first.at, change.start + 0.1), change.stable + LATE_S)
             ]
             error = math.dist(first.xy, xy)
             squares.append(
@@ -69,21 +69,19 @@ def precision(
     return Precision(len(squares) / trials, means[0], means[1], means[2], means[3])
 
 
-def _limit(
-    world: BoardWorld, weight: int, xy: tuple[float, float], before: tuple[float, float], after: tuple[float, float]
-) -> float:
-    """The limit with every sample of the empty board since ``before`` and of the loaded one in ``after``."""
-    p = world.parameters
-    samples = np.arange(math.ceil(before[0] / p.period_s), math.floor(after[1] / p.period_s) + 1)
+def _limit(world: BoardWorld, name: str, empty_since: float, touched: float, until: float) -> float:
+    """The limit with every sample of the empty board, and every one since the hand touched it ``until`` then."""
+    p, thing = world.parameters, world.things[name]
+    samples = np.arange(math.ceil(empty_since / p.period_s), math.floor(until / p.period_s) + 1)
     t = samples.astype(np.float64) * p.period_s
     factor = np.where(world.reader.on_at(t), p.electronics.rf_noise_factor, 1.0)
     variance = difference_variance(
         p.electronics.noise_sd_g * factor,
-        (t >= before[0]) & (t <= before[1]),
-        (t >= after[0]) & (t <= after[1]),
+        thing.trace.moments(t)[:, 0] / thing.weight_g,
+        t <= touched,
         p.electronics.gram_per_count,
     )
-    return position_limit(world.shares, weight, xy, variance)
+    return position_limit(world.shares, thing.weight_g, thing.xy, variance)
 
 
 def _play(world: BoardWorld, cabinet: Contestant, recording: Recording) -> list[Detection]:
@@ -110,7 +108,7 @@ def draw(by_weight: dict[int, tuple[Precision, Precision]], path: Path) -> None:
         raise SystemExit("no matplotlib: pip install 'robot-town-tms[dev]'") from None
     matplotlib.use("Agg")
     from matplotlib import pyplot
-    from matplotlib.ticker import ScalarFormatter
+    from matplotlib.ticker import FuncFormatter
 
     weights = list(by_weight)
     ours, laboratory = zip(*by_weight.values(), strict=True)
@@ -129,8 +127,8 @@ def draw(by_weight: dict[int, tuple[Precision, Precision]], path: Path) -> None:
         ylabel="position error (root mean square) in mm",
         title="Where on the board? Four cells, noise 8 g, counts of 5 g",
     )
-    axes.xaxis.set_major_formatter(ScalarFormatter())
-    axes.yaxis.set_major_formatter(ScalarFormatter())
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.minorticks_off()
     axes.grid(alpha=0.3)
     axes.legend()

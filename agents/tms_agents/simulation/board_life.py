@@ -30,6 +30,11 @@ class LifeParameters:
     #: Of the moves: along the board, and how far.
     slide_share: float = 0.3
     slide_m: tuple[float, float] = (0.05, 0.15)
+    #: Of the episodes: a cell repeats itself from before the change until after it; the board is off for some seconds
+    #: of the rest.
+    stuck_share: float = 0.0
+    power_share: float = 0.0
+    off_s: tuple[float, float] = (1.0, 4.0)
     #: Things keep so far from the board's edge and, where there is room, from one another.
     margin_m: float = 0.03
     apart_m: float = 0.08
@@ -57,10 +62,29 @@ class Household:
         yield Episode((), self.world.run(5.0))
         done = 0
         while done < changes:
+            stuck = self._stick()
             made = self._act()
             done += sum(change.kind != "lean" for change in made)
             seconds = self.world.settled_at - self.world.time_s + self._rng.uniform(*self.parameters.rest_s)
-            yield Episode(made, self.world.run(seconds))
+            recording = self.world.run(seconds)
+            if stuck is not None:
+                self.world.electronics.repair(stuck)
+            elif self._rng.random() < self.parameters.power_share:
+                recording = _joined(recording, self._power_cycle())
+            yield Episode(made, recording)
+
+    def _stick(self) -> int | None:
+        if self._rng.random() >= self.parameters.stuck_share:
+            return None
+        cell = int(self._rng.integers(len(self.world.parameters.cells)))
+        self.world.electronics.stick(cell)
+        return cell
+
+    def _power_cycle(self) -> Recording:
+        self.world.electronics.power(False)
+        dark = self.world.run(float(self._rng.uniform(*self.parameters.off_s)))
+        self.world.electronics.power(True)
+        return _joined(dark, self.world.run(float(self._rng.uniform(*self.parameters.rest_s))))
 
     def _act(self) -> tuple[Change, ...]:
         p, rng = self.parameters, self._rng
@@ -109,3 +133,7 @@ class Household:
             if all(math.dist((x, y), other) >= p.apart_m for other in taken):
                 break
         return (x, y)
+
+
+def _joined(a: Recording, b: Recording) -> Recording:
+    return Recording(np.concatenate([a.t, b.t]), np.concatenate([a.counts, b.counts]), [*a.rounds, *b.rounds])
