@@ -22,7 +22,7 @@ _REPEAT_START, _REPEAT_LEAST, _REPEAT_MOST = 0.5, 0.15, 0.999
 
 @dataclass(slots=True)
 class Block:
-    """Mean of ``n`` consecutive samples from ``start`` to ``end`` (s); the noise stage fills in the ``variance`` of it."""
+    """Mean of ``n`` consecutive samples from ``start`` to ``end`` (s); the noise stage fills in its ``variance``."""
 
     start: float
     end: float

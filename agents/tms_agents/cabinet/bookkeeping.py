@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished
+from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
 from tms_agents.cabinet.fusion import Explanation
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.settings import EstimatorSettings
@@ -36,6 +36,8 @@ class Bookkeeper:
     def __init__(self, shelf: Shelf, settings: EstimatorSettings) -> None:
         self._shelf, self._settings = shelf, settings
         self.settling: Settling | None = None
+        #: What the last step put.
+        self.newest: list[Thing] = []
 
     def apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         """Do to the shelf what ``explanation`` says about ``step``."""
@@ -54,14 +56,37 @@ class Bookkeeper:
             events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
             before_variance = step.before_variance + gone_variance
             self.settling = Settling(thing, step.before - gone, before_variance, step.now)
+            self.newest = [thing]
+        elif explanation.kind in ("two", "joint"):
+            events += self._put_two(step, explanation)
         elif explanation.kind in ("slide", "adjust"):
             assert explanation.thing is not None and explanation.load is not None
             thing = explanation.thing
-            thing.load, thing.variance = explanation.load, thing.variance + step.variance
-            if settling is not None and settling.thing is thing and explanation.kind == "adjust":
-                thing.variance = step.variance - step.before_variance + settling.variance
-                self.settling = Settling(thing, settling.before, settling.variance, step.now)
+            if settling is None or settling.thing is not thing:
+                settling = Settling(thing, step.before - thing.load, step.before_variance + thing.variance, step.now)
+            thing.load = explanation.load
+            thing.variance = step.variance - step.before_variance + settling.variance
+            self.settling = Settling(thing, settling.before, settling.variance, step.now)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
+        return events
+
+    def _put_two(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
+        events: list[CabinetEvent] = []
+        assert explanation.load is not None and explanation.second is not None
+        self.newest = []
+        for load in (explanation.load, explanation.second):
+            # Not told apart: each may stand anywhere.
+            variance = explanation.variance if explanation.variance is not None else (0.35 * load.sum()) ** 2 + load * 0
+            thing = self._shelf.put(load, variance, since=step.settled, onset=step.onset)
+            at = thing.centre(self._shelf.geometry)
+            thing.told = at.xy
+            events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
+            self.newest.append(thing)
+        ids = tuple(thing.id for thing in self.newest)
+        for thing in self.newest:
+            thing.joint = frozenset(ids) - {thing.id}
+        if explanation.kind == "joint":
+            events.append(LoadChanged(step.now, ids, step.weight_g, float(np.sqrt(step.variance.sum()))))
         return events
 
     def _remove(self, thing: Thing, step: Step, *, alone: bool) -> Vanished:
@@ -87,6 +112,11 @@ class Bookkeeper:
             return []
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
+        if float(thing.load.sum()) < 0.4 * self._settings.min_weight_g:
+            # It was nothing after all.
+            self.settling = None
+            del self._shelf.things[thing.id]
+            return [Vanished(now, thing.id, *thing.centre(self._shelf.geometry)[2:])]
         if settling.looked or now - settling.posted < self._settings.refine_after_s:
             return []
         settling.looked = True

@@ -91,7 +91,7 @@ class CabinetEstimator:
         if zone not in self._zones:
             raise ValueError(f"there is no zone {zone!r}")
         self._presence.see(t, zone, tags)
-        return self._namer.update(t)
+        return self._namer.update(t, resting=self._detector.resting)
 
     def know(self, tag: str, weight: KnownWeight) -> None:
         """What the object with this tag weighs, from the object database."""
@@ -127,28 +127,39 @@ class CabinetEstimator:
 
     def _explain(self, step: Step) -> list[CabinetEvent]:
         final = self._detector.is_final(step)
-        patient = not final and step.now - step.settled < self._settings.patience_s
+        waited = math.inf if final else step.now - step.settled
         best = explain(step, self._shelf, self._evidence(step), self._settings)[0]
-        if best.kind == "unknown":
-            if patient:
+        if best.kind in ("unknown", "press"):
+            if waited < self._settings.stubborn_s:
                 self._detector.hold(step)
             elif final:
                 self._detector.ignore(step)
             else:
                 self._detector.accept(step)
             return []
-        if best.score < 0.9 and patient:
+        unsure = best.score < 0.9 or (self._looks_pressed(step, best) and waited < 0.5 * self._settings.patience_s)
+        if unsure and waited < self._settings.patience_s:
             self._detector.hold(step)
             return []
         return self._take(step, best)
 
+    def _looks_pressed(self, step: Step, best: Explanation) -> bool:
+        """A thing that must be one of some known weights, and is of none of them: a hand still holds it."""
+        weights = [weight for weight in self._namer.loose().values() if weight is not None]
+        if best.load is None or best.kind not in ("put", "swap") or not weights:
+            return False
+        weight, sd = float(best.load.sum()), math.sqrt(float(step.variance.sum()))
+        return all(abs(weight - known.mean_g) > 4 * math.hypot(sd, known.sd_g) + 2.0 for known in weights)
+
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         for thing in explanation.removed:
             at = thing.centre(self._geometry)
-            self._namer.left(thing, at.weight_g, at.weight_sd_g)
+            self._namer.left(thing, step.settled, at.weight_g, at.weight_sd_g)
         events = self._book.apply(step, explanation)
         self._detector.accept(step)
-        return events + self._namer.update(step.now)
+        for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
+            events.append(self._namer.pin(step.now, thing, tag))
+        return events + self._namer.update(step.now, resting=self._detector.resting)
 
     def _evidence(self, step: Step) -> Evidence:
         settling = self._book.settling
@@ -157,9 +168,9 @@ class CabinetEstimator:
             return 0.0 if thing.tag is None else self._presence.taken(thing.tag, step.settled)
 
         if settling is None:
-            return Evidence(taken, self._namer.loose_weights())
+            return Evidence(taken, self._namer.loose())
         gap = max(step.onset - settling.posted, 0.0)
-        return Evidence(taken, self._namer.loose_weights(), settling.thing, math.exp(-gap / 0.7))
+        return Evidence(taken, self._namer.loose(), settling.thing, math.exp(-gap / 0.7))
 
     def _drifted(self, seconds: float) -> None:
         rate = self._settings.creep_per_hour * (np.abs(self._shelf.total()) + 500.0)

@@ -12,9 +12,10 @@ misses since the step count for and against the tagged things that an explanatio
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,14 +23,28 @@ import numpy as np
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.position import centre_free, off_board
 from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.splitting import split
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step
 
-Kind = Literal["unknown", "put", "take", "slide", "swap", "adjust"]
+Kind = Literal["unknown", "put", "take", "slide", "swap", "adjust", "press", "two", "joint"]
 
 #: Prior probabilities of what happens in one step. Two things at once are rare, one thing slid without lifting too.
-_PRIOR: dict[Kind, float] = {"put": 0.45, "take": 0.45, "slide": 0.01, "swap": 0.03, "adjust": 0.3, "unknown": 1e-4}
+_PRIOR: dict[Kind, float] = {
+    "put": 0.45,
+    "take": 0.45,
+    "slide": 0.05,
+    "swap": 0.02,
+    "adjust": 0.3,
+    "press": 0.1,
+    "unknown": 1e-4,
+}
 _TWO_TAKEN = 0.03
+#: Two things put at once: usually, and while two tags that are at no stay are in view.
+_TWO_PUT, _TWO_PUT_TAGS = 0.02, 0.2
+_LOOSE_TRIED = 6
+#: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
+_HAND_M, _CROWDED_M = 0.015, 0.03
 #: Weights of things are spread evenly in their logarithm between these.
 _LIGHTEST_G, _HEAVIEST_G = 3.0, 20_000.0
 _LOG_RANGE = math.log(math.log(_HEAVIEST_G / _LIGHTEST_G))
@@ -44,6 +59,10 @@ class Explanation:
     removed: tuple[Thing, ...] = ()
     thing: Thing | None = None
     load: Array | None = None
+    #: Load of the second thing (two), or the tags of those whose loads only the sum is known of (joint).
+    second: Array | None = None
+    variance: Array | None = None
+    tags: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +70,8 @@ class Evidence:
     """Beside the load: tags taken (log-likelihood ratio), weights that may be put, a thing still settling."""
 
     taken: Callable[[Thing], float]
-    weights: Sequence[KnownWeight]
+    #: Tags that are at no stay, with their weights where these are known.
+    loose: Mapping[str, KnownWeight | None]
     settling: Thing | None = None
     settling_share: float = 0.0
 
@@ -59,16 +79,16 @@ class Evidence:
 def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
     """All explanations with their posterior probability as score, the most probable first."""
     change, variance, geometry = step.change, step.variance, shelf.geometry
-    put = PutDensity(geometry, evidence.weights)
+    weights = [weight for weight in evidence.loose.values() if weight is not None]
+    put = PutDensity(geometry, settings.min_weight_g, weights)
     things = list(shelf.things.values())
     found = [
-        Explanation("put", math.log(_PRIOR["put"]) + put(change, variance), load=change),
-        Explanation("unknown", math.log(_PRIOR["unknown"]) + put(np.abs(change), variance)),
+        Explanation("put", math.log(_PRIOR["put"]) + put(change, variance) + _crowded(step, shelf), load=change),
+        Explanation("unknown", math.log(_PRIOR["unknown"]) + put.anything(change, variance)),
     ]
     each = math.log(1.0 / max(len(things), 1))
     noises = [thing.at(step.now, settings.creep_per_hour) for thing in things]
     taken = [evidence.taken(thing) for thing in things]
-    weight_free = abs(step.weight_g) ** 2 < 12.0 * float(variance.sum()) + 4.0
     for thing, noise, tag in zip(things, noises, taken, strict=True):
         left, both = change + thing.load, variance + noise
         found.append(Explanation("take", math.log(_PRIOR["take"]) + each + normal(left, both) + tag, removed=(thing,)))
@@ -77,7 +97,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             found.append(
                 Explanation("swap", math.log(_PRIOR["swap"]) + each + after + tag, removed=(thing,), load=left)
             )
-            if weight_free:
+            if abs(step.weight_g) < 0.3 * float(thing.load.sum()):
                 found.append(
                     Explanation(
                         "slide",
@@ -86,11 +106,23 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
                         load=left,
                     )
                 )
-            if thing is evidence.settling and evidence.settling_share > 0:
+            if step.weight_g > 0:
+                prior = math.log(_PRIOR["press"]) + each
+                found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
+            if thing is evidence.settling and evidence.settling_share > 0.01:
                 prior = math.log(_PRIOR["adjust"] * evidence.settling_share)
                 found.append(Explanation("adjust", prior + put.same_place(thing, step), thing=thing, load=left))
     found += _two_taken(step, things, noises, taken)
+    if step.weight_g > 2 * settings.min_weight_g:
+        found += _two_put(step, put, evidence.loose)
     return _normalised(found)
+
+
+def _crowded(step: Step, shelf: Shelf) -> float:
+    """Log of the room that the things on the board leave for another one where the step is."""
+    at = np.array(centre_free(step.change, shelf.geometry))
+    near = [float(np.hypot(*(at - thing.centre(shelf.geometry).xy))) for thing in shelf.things.values()]
+    return math.log(1.0 - 0.95 * math.exp(-0.5 * (min(near) / _CROWDED_M) ** 2)) if near else 0.0
 
 
 def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list[float]) -> list[Explanation]:
@@ -106,14 +138,32 @@ def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list
     return [Explanation("take", float(scores[i]), removed=(things[first[i]], things[second[i]])) for i in best]
 
 
+def _two_put(step: Step, put: PutDensity, loose: Mapping[str, KnownWeight | None]) -> list[Explanation]:
+    """Two things at once: told apart by the path of the load, or only known as a sum of two known weights."""
+    prior = math.log(_TWO_PUT_TAGS if len(loose) >= 2 else _TWO_PUT)
+    found = []
+    parts = split(step)
+    if parts is not None:
+        volume = 0.5 * float(np.log(2 * math.pi * parts.variance).sum())
+        score = prior + parts.gain + put(parts.first, parts.variance) + put(parts.second, parts.variance) + volume
+        if score > -math.inf:
+            found.append(Explanation("two", score, load=parts.first, second=parts.second, variance=parts.variance))
+    known = [(tag, weight) for tag, weight in loose.items() if weight is not None][-_LOOSE_TRIED:]
+    pairs = list(itertools.combinations(known, 2))
+    for (tag, weight), (other, more) in pairs:
+        both = KnownWeight(weight.mean_g + more.mean_g, math.hypot(weight.sd_g, more.sd_g))
+        score = prior - math.log(len(pairs)) + put.of(both)(step.change, step.variance)
+        share = weight.mean_g / both.mean_g
+        load, second = share * step.change, (1 - share) * step.change
+        found.append(Explanation("joint", score, load=load, second=second, tags=(tag, other)))
+    return found
+
+
 def _normalised(found: list[Explanation]) -> list[Explanation]:
     top = max(item.score for item in found)
     total = sum(math.exp(item.score - top) for item in found)
     ranked = sorted(found, key=lambda item: -item.score)
-    return [
-        Explanation(i.kind, math.exp(i.score - top) / total, removed=i.removed, thing=i.thing, load=i.load)
-        for i in ranked
-    ]
+    return [replace(item, score=math.exp(item.score - top) / total) for item in ranked]
 
 
 def normal(value: Array, variance: Array) -> float:
@@ -124,29 +174,33 @@ def normal(value: Array, variance: Array) -> float:
 class PutDensity:
     """Log density of a load vector (k,), per g^k, if it is that of one thing somewhere on the board."""
 
-    def __init__(self, geometry: Geometry, weights: Sequence[KnownWeight] = ()) -> None:
-        self._geometry, self._weights = geometry, weights
+    def __init__(self, geometry: Geometry, least_g: float, weights: Sequence[KnownWeight] = ()) -> None:
+        self._geometry, self._least_g, self._weights = geometry, least_g, weights
         self._area = geometry.width * geometry.depth
         self._jacobian = float(np.linalg.slogdet(np.vstack([geometry.moments, geometry.twist]))[1])
 
     def __call__(self, load: Array, variance: Array) -> float:
         weight, sd2 = float(load.sum()), float(variance.sum())
-        if weight < max(2.0 * math.sqrt(sd2), _LIGHTEST_G):
+        if weight < max(4.0 * math.sqrt(sd2), self._least_g):
             return -math.inf
         place = off_board(load, variance, self._geometry) - math.log(self._area) - 2 * math.log(weight)
         return self._weight(weight, sd2) + place + self._twist(load, variance, weight) + self._jacobian
 
-    def same_place(self, thing: Thing, step: Step) -> float:
+    def of(self, weight: KnownWeight) -> PutDensity:
+        """The same for a load of that weight."""
+        return PutDensity(self._geometry, self._least_g, [weight])
+
+    def same_place(self, thing: Thing, step: Step, apart_m: float = 0.005) -> float:
         """Density of a further change where ``thing`` stands: it was still being put down, or pressed."""
         weight = step.weight_g
         size = max(abs(weight), 1.0)
-        if weight + float(thing.load.sum()) < _LIGHTEST_G:
+        if weight + float(thing.load.sum()) < self._least_g:
             return -math.inf
         here = np.array(thing.centre(self._geometry).xy) - np.array(centre_free(step.change, self._geometry))
         at = np.array(self._geometry.cells)
         arms, own = (at - thing.centre(self._geometry).xy).T, float(thing.load.sum())
         cov = (arms * step.variance) @ arms.T / size**2 + (arms * thing.variance) @ arms.T / own**2
-        cov = cov + np.eye(2) * 0.005**2
+        cov = cov + np.eye(2) * apart_m**2
         place = -0.5 * float(here @ np.linalg.solve(cov, here)) - 0.5 * math.log(float(np.linalg.det(cov)))
         place -= math.log(2 * math.pi) + 2 * math.log(size)
         return (
@@ -162,6 +216,11 @@ class PutDensity:
         place = off_board(load, variance, self._geometry) - math.log(self._area) - 2 * math.log(weight)
         total = -0.5 * (float(change.sum()) ** 2 / sd2 + math.log(2 * math.pi * sd2))
         return total + place + self._twist(load, variance, weight) + self._jacobian
+
+    def anything(self, change: Array, variance: Array) -> float:
+        """Density of a change that no thing makes: any size and sign, shared among the cells in any way."""
+        size = np.sqrt(change**2 + variance).sum()
+        return -math.log(2 * size) - _LOG_RANGE - (len(change) - 1) * math.log(size)
 
     def _weight(self, weight: float, sd2: float, *, known: bool = True) -> float:
         broad = -math.log(max(weight, 1.0)) - _LOG_RANGE

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from tms_agents.cabinet.events import CabinetEvent, Identified, ZoneRead
 from tms_agents.cabinet.geometry import KnownWeight, Zone
-from tms_agents.cabinet.identify import assign
+from tms_agents.cabinet.identify import Fit, assign
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
@@ -30,29 +30,33 @@ class Namer:
         self.known: dict[str, KnownWeight] = dict(known)
         self.learned: dict[str, KnownWeight] = {}
         self._loose: dict[str, float] = {}
+        #: When a tag's last stay ended: it cannot be at a stay that began before.
+        self._lifted: dict[str, float] = {}
         self._told: dict[tuple[str, str], float] = {}
 
     def weight(self, tag: str) -> KnownWeight | None:
         """What the object weighed when it was here last, else what the database says."""
         return self.learned.get(tag) or self.known.get(tag)
 
-    def loose_weights(self) -> list[KnownWeight]:
-        """Known weights of the present tags that are at no stay: what may be put next."""
-        return [weight for tag in self._loose if (weight := self.weight(tag)) is not None]
+    def loose(self) -> dict[str, KnownWeight | None]:
+        """The present tags that are at no stay, with what is known of their weights: what may be put next."""
+        return {tag: self.weight(tag) for tag in self._loose}
 
-    def update(self, now: float) -> list[CabinetEvent]:
-        """Look at tags and stays together; called after every round and every event of the load."""
+    def update(self, now: float, *, resting: bool) -> list[CabinetEvent]:
+        """Look at tags and stays together; called after every round and every event of the load.
+
+        While the load is not ``resting`` no tag is pinned: it may be that of the thing which is just being put.
+        """
         present = self._presence.present()
         pinned = {thing.tag for thing in self._shelf.things.values() if thing.tag is not None}
         loose = {tag: zones for tag, zones in present.items() if tag not in pinned}
         self._loose = {tag: self._loose.get(tag, now) for tag in loose}
         events: list[CabinetEvent] = []
         open_things = [thing for thing in self._shelf.things.values() if thing.tag is None]
-        if open_things and loose:
+        if resting and open_things and loose:
             weights = {tag: weight for tag in loose if (weight := self.weight(tag)) is not None}
-            chances = assign(
-                open_things, loose, weights, self._presence, self._zones, self._shelf.geometry, self._settings
-            )
+            fit = Fit(weights, self._lifted, self._presence, self._zones, self._shelf.geometry, self._settings)
+            chances = assign(open_things, loose, fit)
             for (stay, tag), chance in chances.items():
                 if chance >= 1 - self._settings.doubt:
                     events.append(self.pin(now, self._shelf.things[stay], tag))
@@ -67,13 +71,16 @@ class Namer:
             thing.known = weight
         return Identified(now, thing.id, tag)
 
-    def left(self, thing: Thing, weight_g: float, sd_g: float) -> None:
+    def left(self, thing: Thing, now: float, weight_g: float, sd_g: float) -> None:
         """A thing was lifted: remember what it weighed."""
         if thing.tag is not None:
+            self._lifted[thing.tag] = now
             self.learned.pop(thing.tag, None)
             self.learned[thing.tag] = KnownWeight(weight_g, sd_g + 0.005 * abs(weight_g))
             while len(self.learned) > _LEARNED_KEPT:
                 del self.learned[next(iter(self.learned))]
+            while len(self._lifted) > _LEARNED_KEPT:
+                del self._lifted[next(iter(self._lifted))]
 
     def _zone_reads(self, now: float, loose: Mapping[str, Mapping[str, object]]) -> list[CabinetEvent]:
         events: list[CabinetEvent] = []

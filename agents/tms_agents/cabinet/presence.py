@@ -40,10 +40,12 @@ class Presence:
         self._missed = math.log((1 - hit) / (1 - false))
         self._hit, self._false = hit, false
         self._zones: dict[str, dict[str, Sighting]] = {}
+        self._rounds: dict[str, deque[float]] = {}
 
     def see(self, t: float, zone: str, tags: Iterable[str]) -> None:
         """One completed round of one zone."""
         known = self._zones.setdefault(zone, {})
+        self._rounds.setdefault(zone, deque(maxlen=_ROUNDS_KEPT)).append(t)
         seen = set(tags)
         for tag in seen - known.keys():
             if len(known) < _TAGS_KEPT:
@@ -88,6 +90,11 @@ class Presence:
             if start <= t <= end
         ]
         return sum(looks), len(looks) - sum(looks)
+
+    def silent_rounds(self, tag: str, start: float) -> int:
+        """Rounds from ``start`` until the tag was first read in this visit, in the zone that read it first."""
+        zone, sighting = min(self.sightings(tag).items(), key=lambda item: item[1].first)
+        return sum(start <= t < sighting.first - 1e-9 for t in self._rounds[zone])
 
     def taken(self, tag: str, since: float, in_hand: float = 0.3) -> float:
         """Log-likelihood ratio that the tag left at ``since``; a lifted thing may stay in view in the hand."""

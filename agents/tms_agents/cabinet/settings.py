@@ -36,13 +36,18 @@ class EstimatorSettings:
     #: A changed load is told from the old one when it differs by so many standard deviations ...
     change_sd: float = 4.5
     #: ... and by so much. The laboratory's own threshold is 20 g.
-    min_weight_g: float = 9.0
+    min_weight_g: float = 14.0
     #: A load must be steady this long to count.
     settle_s: float = 0.38
-    #: Steady: the halves of that time differ by less than so many standard deviations.
+    #: Steady: the trend is less than so many standard deviations, and no trend is more likely than going on, by this
+    #: logarithm of odds.
     settle_sd: float = 2.0
+    settle_odds: float = 3.0
     #: An unexplained or ambiguous change is held this long in the hope of more samples or tag reads.
     patience_s: float = 2.0
+
+    #: A change that nothing explains (a hand that presses, a thing half lifted) becomes the new zero only after this.
+    stubborn_s: float = 4.0
 
     # --- tags
     #: Probability that an antenna reads a tag in its zone in one round, and that it reads one that is not there.

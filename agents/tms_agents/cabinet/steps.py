@@ -18,8 +18,11 @@ from tms_agents.cabinet.baseline import Level
 from tms_agents.cabinet.blocks import Block
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.steady import average, chi_square_limit, steady_tail
 
 _CHANGING_BLOCKS = 1000
+#: Blocks remembered before a change.
+_HISTORY_BLOCKS = 75
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,9 @@ class Step:
     #: The old level (k,) g and its variance.
     before: Array
     before_variance: Array
+    #: How it went from one to the other: block means (n, k) above the old level, and their variances.
+    path: Array
+    path_variance: Array
 
     @property
     def weight_g(self) -> float:
@@ -50,6 +56,7 @@ class StepDetector:
         self._settings, self._cells = settings, cells
         self.level = Level(cells, settings.level_memory_s)
         self._recent: deque[Block] = deque()
+        self._history: deque[Block] = deque(maxlen=_HISTORY_BLOCKS)
         self._resting_blocks = 0
         self._changed: list[Block] | None = None
         self._offered: tuple[Step, list[Block]] | None = None
@@ -61,6 +68,7 @@ class StepDetector:
 
     def push(self, block: Block) -> Step | None:
         """Take one block; a step if the load is steady at another level."""
+        self._history.append(block)
         if self._changed is None:
             self._rest(block)
             return None
@@ -82,6 +90,7 @@ class StepDetector:
         if self.level.known:
             self._changed, self._offered = [], None
         self._recent.clear()
+        self._history.clear()
         self._resting_blocks = 0
 
     def accept(self, step: Step) -> None:
@@ -92,6 +101,7 @@ class StepDetector:
         self._start_resting(steady)
         if after:
             self._changed, self._offered = after, None
+            self._history.extend(after)
 
     def hold(self, step: Step) -> None:
         """``step`` is not explained yet: offer it again with more samples, or with what comes after it."""
@@ -135,6 +145,7 @@ class StepDetector:
         for block in blocks[:half]:
             self.level.add(block)
         self._recent = deque(blocks[half:])
+        self._history = deque(blocks, maxlen=_HISTORY_BLOCKS)
         self._resting_blocks = len(blocks)
         self._changed, self._offered = None, None
 
@@ -143,22 +154,31 @@ class StepDetector:
     def _settle(self) -> Step | None:
         settings, blocks = self._settings, self._changed
         assert blocks is not None
-        steady = steady_tail(blocks, settings, self.level.mean)
+        steady = steady_tail(list(self._history), self.level.mean, self.level.variance, settings)
         if not steady:
             return None
+        steady = [block for block in steady if block.start >= blocks[0].start]
         if self._offered is not None and steady[0].start >= self._offered[0].now:
             # The load went on from a plateau that was on offer: that one comes first, and finally.
             return self._offered[0]
         mean, variance = average(steady)
         change, variance = mean - self.level.mean, variance + self.level.variance
+        way = [block for block in blocks if block.start < steady[0].start]
         step = Step(
-            blocks[0].start, steady[0].start, steady[-1].end, change, variance, self.level.mean, self.level.variance
+            onset=blocks[0].start,
+            settled=steady[0].start,
+            now=steady[-1].end,
+            change=change,
+            variance=variance,
+            before=self.level.mean,
+            before_variance=self.level.variance,
+            path=np.array([block.mean for block in way]).reshape(-1, self._cells) - self.level.mean,
+            path_variance=np.array([block.variance for block in way]).reshape(-1, self._cells),
         )
         total = step.weight_g**2 / float(variance.sum())
         score = max(total, float((change**2 / variance).sum()) / self._whole_limit)
         seconds = step.now - step.settled
-        big = abs(step.weight_g) >= settings.min_weight_g or total < settings.change_sd**2
-        if score >= settings.change_sd**2 and big:
+        if score >= settings.change_sd**2:
             self._offered = (step, steady)
             return step
         if score < 0.6 * settings.change_sd**2:
@@ -172,48 +192,3 @@ class StepDetector:
     def is_final(self, step: Step) -> bool:
         """Whether the load has left the plateau of ``step`` already, so that it cannot be held any longer."""
         return self._changed is not None and bool(self._changed) and self._changed[-1].end > step.now + 1e-9
-
-
-def steady_tail(blocks: Sequence[Block], settings: EstimatorSettings, old: Array) -> list[Block]:
-    """The longest run of newest blocks without a trend, [] while there is none of ``settle_s``."""
-    length, seconds = 0, 0.0
-    while length < len(blocks) and seconds < settings.settle_s:
-        length += 1
-        seconds += blocks[-length].end - blocks[-length].start
-        if length < len(blocks):  # blocks are told by their first and last sample: add the pause between them
-            seconds += blocks[-length].start - blocks[-length - 1].end
-    if seconds < settings.settle_s or length < 2:
-        return []
-    tail = list(blocks[-length:])
-    half = length // 2
-    (early, early_var), (late, late_var) = average(tail[:half]), average(tail[half:])
-    # A thing that still rocks by some thousandth of its weight is as good as steady.
-    variance = early_var + late_var + (0.003 * (late - old)) ** 2
-    trend = late - early
-    if trend.sum() ** 2 > settings.settle_sd**2 * variance.sum():
-        return []
-    if (trend**2 / variance).sum() > chi_square_limit(settings.settle_sd, len(trend)):
-        return []
-    mean, mean_var = average(tail)
-    for block in reversed(blocks[:-length]):
-        distance, both = block.mean - mean, block.variance + mean_var
-        if distance.sum() ** 2 > 6.0 * both.sum() or (distance**2 / both).sum() > chi_square_limit(2.5, len(trend)):
-            break
-        tail.insert(0, block)
-        mean, mean_var = average(tail)
-    return tail
-
-
-def average(blocks: Sequence[Block]) -> tuple[Array, Array]:
-    """Mean (k,) weighted by quietness, and its variance (k,)."""
-    variances = np.array([b.variance for b in blocks])
-    weights = 1.0 / variances.mean(axis=1)
-    weights /= weights.sum()
-    return weights @ np.array([b.mean for b in blocks]), (weights**2) @ variances
-
-
-def chi_square_limit(sd: float, freedom: int) -> float:
-    """Value of chi-square with ``freedom`` degrees that is as improbable as ``sd`` deviations (Wilson-Hilferty)."""
-    share = 2.0 / (9.0 * freedom)
-    # Two-sided deviations of one variable and the one-sided tail of chi-square: half a deviation less is close enough.
-    return float(freedom * (1.0 - share + (sd - 0.15) * np.sqrt(share)) ** 3)

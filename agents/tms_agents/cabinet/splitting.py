@@ -1,0 +1,64 @@
+"""Two things put down at about the same time: the path of the load tells them apart where their sum cannot.
+
+While only the first thing comes down the load moves along its direction, u1 (its shares of the cells); while only the
+second one is left it moves along the other's, u2. Where the path turns is found by least squares; then the whole step D
+is w1 u1 + w2 u2.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.steps import Step
+
+_LEAST_BLOCKS = 4
+
+
+class Split(NamedTuple):
+    """Loads (k,) of the first and the second thing, their variances, and what the path says for two things and not one.
+
+    ``gain`` is a log-likelihood ratio before any prior.
+    """
+
+    first: Array
+    second: Array
+    variance: Array
+    gain: float
+
+
+def split(step: Step) -> Split | None:
+    """The step as the sum of two; None where its path is too short to tell."""
+    path, noise = step.path, step.path_variance
+    count, cells = path.shape
+    if count < _LEAST_BLOCKS:
+        return None
+    sd = np.sqrt(noise.mean(axis=0))
+    weight = np.sqrt((sd**2).mean() / noise.mean(axis=1))[:, None]
+    whole = step.change / sd
+    so_far, to_go = weight * path / sd, weight * (whole - path / sd)
+    early = np.cumsum(so_far[:, :, None] * so_far[:, None, :], axis=0)
+    late = np.cumsum((to_go[:, :, None] * to_go[:, None, :])[::-1], axis=0)[::-1]
+    early_values, early_vectors = np.linalg.eigh(early)
+    late_values, late_vectors = np.linalg.eigh(late)
+    # Misfit of the first i + 1 blocks to one direction, of those from j on to another; between them, that of noise.
+    misfit_early, misfit_late = early_values[:, :-1].sum(axis=1), late_values[:, :-1].sum(axis=1)
+    between = np.arange(count)[None, :] - np.arange(count)[:, None] - 1
+    cost = misfit_early[:, None] + misfit_late[None, :] + (cells - 0.5) * between
+    i, j = np.unravel_index(np.where(between >= 0, cost, np.inf).argmin(), cost.shape)
+    one = whole / np.linalg.norm(whole)
+    single = float((so_far**2).sum() - ((so_far @ one) ** 2).sum())
+    directions = np.stack([early_vectors[i, :, -1], late_vectors[j, :, -1]])
+    if abs(float(directions[0] @ directions[1])) > 0.999:
+        return None
+    scale, *_ = np.linalg.lstsq(directions.T, whole, rcond=None)
+    left = whole - scale @ directions
+    # Errors of the directions, by how far the path went along each of them.
+    errors = scale**2 / np.maximum([early_values[i, -1], late_values[j, -1]], 1.0)
+    spread = 1.0 / max(1e-3, 1.0 - float(directions[0] @ directions[1]) ** 2)
+    variance = sd**2 * float(errors.sum()) * spread + step.variance
+    misfit = float(cost[i, j]) + float((left**2 / (variance / sd**2)).sum())
+    first = scale[0] * directions[0] * sd
+    return Split(first, step.change - first, variance, 0.5 * (single - misfit))
