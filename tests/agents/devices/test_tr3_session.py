@@ -85,8 +85,16 @@ def test_weighing_pauses_the_field_and_a_new_connection_keeps_it_off(rests):
     host = session(clock, field=field, rf_off_between_rounds=rests)
     converse(host, device, clock, 0.33)
     host.pause()
+    frames = host.frames
     items = converse(host, device, clock, 0.5)
     assert field.is_off and device.radiating is None and items == []
+    assert host.frames >= frames + 5  # it shows that it is alive
+    # switched off and on, it radiates until it is found out
+    device.power_cycle_after = 3
+    converse(host, device, clock, 0.12)
+    assert device.radiating == 0
+    converse(host, device, clock, 1.0)
+    assert field.is_off and device.radiating is None
     # reconnected, to a reader that has been switched off and on and radiates
     device.rf_on = True
     host = session(clock, field=field)

@@ -160,6 +160,9 @@ class ThingMagicSession:
         if not self.field.wanted:
             self.field.is_off = True
             self._drop_reads()
+            if not self._waiting and self._clock() >= self._next_poll:  # still there?
+                self._next_poll = self._clock() + self._poll_s
+                self._waiting.append((Command(m.VERSION), 0))
         elif not self._waiting and self._clock() >= self._next_poll:
             self._next_poll = self._clock() + self._poll_s
             for antenna in self._antennas:

@@ -104,6 +104,11 @@ def command_mode() -> Frame:
     return Frame(MODE, bytes([0x00, 0x00, 0x00, 0x1C]))
 
 
+def read_version() -> Frame:
+    """Of the firmware; answered without a field."""
+    return Frame(READ, b"\x90")
+
+
 def rf_power(on: bool) -> Frame:
     return Frame(MODE, bytes([0x9E, on]))
 

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 from tms_agents.devices.tags import Field, RoundEnd, TagItem, TagRead
 from tms_agents.devices.tr3.codec import (
     INVENTORY_OPTIONS,
+    MODE,
     NACK,
     RDLOOP,
     SUM_ERROR,
@@ -19,6 +20,7 @@ from tms_agents.devices.tr3.codec import (
     acknowledges,
     command_mode,
     inventory,
+    read_version,
     rf_power,
     select_antenna,
 )
@@ -172,7 +174,7 @@ class Tr3Session:
                 self._switches, self._selected = False, None
             elif current.frame.data[:1] == b"\x9e":
                 self._radiates = True  # a field that cannot be switched is on
-            else:
+            elif current.frame.command == MODE:
                 self._set_up = True
             self._done()
         else:
@@ -186,7 +188,7 @@ class Tr3Session:
             self.field.is_off = not self._radiates and not self.field.wanted
         elif command.data[:1] == b"\x9c":
             self._selected = command.data[1]
-        else:
+        elif command.command == MODE:
             self._set_up = True
 
     def _done(self) -> None:
@@ -196,6 +198,7 @@ class Tr3Session:
         """A reply is missing: the reader may have been switched off and on, so nothing about it is known."""
         self._waiting.clear()
         self._done()
+        self.field.is_off = False
         self._set_up, self._radiates, self._selected, self._pausing = False, None, None, False
 
     def _advance(self) -> None:
@@ -206,6 +209,9 @@ class Tr3Session:
                 self._pausing = True
                 self._waiting = deque() if self._radiates is False else deque(self._switched_off())
                 self.field.is_off = self._radiates is False
+            elif not self._waiting and self._clock() >= self._next_poll:  # still there?
+                self._next_poll = self._clock() + self._poll_s
+                self._waiting.append(_Command(read_version(), optional=True))
         else:
             self._pausing = False
             if not self._waiting and self._clock() >= self._next_poll:
