@@ -3,9 +3,10 @@
 An answer does not say which cell it is of, so one question is on the way at a time, and three things are doubtful:
 
 * an answer that does not come in time may still come later: its cell is NaN, and nothing is asked until the line was
-  quiet for ``late_s``; what comes in that time is thrown away;
+  quiet for a pause of ``late_s``; what comes in that time is thrown away;
 * a line that is no number may have been an answer or come beside it: the same;
-* a line that nobody asked for says that an earlier answer was shifted to the next cell: the whole round is dropped.
+* a line that nobody asked for says that an earlier answer was shifted to the next cell: the whole round is dropped, and
+  the pause, which was too short for this board, is doubled for a while.
 
 So that the last of these is seen in time, a round is kept back until the line was quiet for twice the slowest of the
 last answers, and handed out with the first answer of the next round. The numbers themselves carry no check sum: a wrong
@@ -31,8 +32,9 @@ _LONGEST_LINE = 40
 _MISSES = 3
 #: The line counts as quiet only after that many looks at it: this process may itself have slept in between.
 _LOOKS = 3
-#: How fast the slowest answer is forgotten, per answer.
-_FORGET = 0.999
+#: How fast the slowest answer is forgotten, per answer, and a doubled pause, per round; the longest pause.
+_FORGET, _RELAX = 0.999, 0.998
+_LONGEST_PAUSE_S = 2.0
 
 
 class RosTmsBoardSession:
@@ -73,7 +75,7 @@ class RosTmsBoardSession:
         self._asked: int | None = None
         self._asked_at = self._heard_at = self._next_round = clock()
         self._draining, self._open_round, self._looks = True, False, 0
-        self._slowest_s = 0.0
+        self._slowest_s, self._pause_s = 0.0, late_s
         self._done: list[LoadSample] = []
 
     def opened(self) -> None:
@@ -95,7 +97,7 @@ class RosTmsBoardSession:
             if self._quiet(now - self._asked_at, self._reply_s):
                 self._miss(now)
         elif self._draining:
-            if self._quiet(now - self._heard_at, self._late_s):
+            if self._quiet(now - self._heard_at, self._pause_s):
                 self._lines.expire()
                 self._draining = False
                 self._ask_next(now)
@@ -160,6 +162,7 @@ class RosTmsBoardSession:
 
     def _drop(self) -> None:
         self.doubtful_rounds += bool(self._open_round or self._done)
+        self._pause_s = max(self._pause_s, min(2 * self._pause_s, _LONGEST_PAUSE_S))
         self._done.clear()
         self._round, self._open_round, self._draining = [], False, True
 
@@ -168,6 +171,7 @@ class RosTmsBoardSession:
             self._drop()
             return
         self._open_round = False
+        self._pause_s = max(self._pause_s * _RELAX, self._late_s)
         dead = [str(cell) for cell, misses in enumerate(self._misses) if misses >= _MISSES]
         fault = f"no answer from cell {', '.join(dead)}" if dead else ""
         if not all(map(math.isnan, self._values)):

@@ -81,6 +81,15 @@ def test_an_answer_too_late_even_for_the_pause_spoils_its_round_only():
     assert wire.session.doubtful_rounds >= 1
 
 
+def test_a_board_slower_than_expected_is_given_longer_pauses():
+    """Answers up to 150 ms late where 60 were expected: a few rounds are lost until the pause is long enough."""
+    wire = Wire(reply_s=0.02, late_s=0.04)
+    rng = random.Random(6)
+    samples = wire.run(30.0, lambda: rng.choice([0.0] * 60 + [0.002] * 20 + [0.08, 0.12, 0.15]))
+    assert len(samples) > 100 and right(samples)
+    assert 1 <= wire.session.doubtful_rounds <= 10
+
+
 @pytest.mark.parametrize("left_over", [b"4321\r\n", b"43"])
 def test_a_line_left_over_after_the_round_drops_it_too(left_over):
     wire = Wire()
