@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet faults fuzz realdata clean help
+.PHONY: demo test test-fast check format bench bench-cabinet faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -13,6 +13,7 @@ help:
 	@echo "make bench     the published numbers of docs/benchmarks.md"
 	@echo "make bench-cabinet  the smart cabinet on simulated boards (docs/cabinet_position.png)"
 	@echo "make faults    the long fault tests (30 kills and more)"
+	@echo "make peers     tests against programs of other people (installs tshark)"
 	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
 
 demo: $(READY)
@@ -46,6 +47,14 @@ fuzz: $(READY)
 
 realdata: $(READY)
 	$(BIN)/python -m pytest -q -m realdata
+
+# Programs of other people judge ours: Debian's tshark, installed where it is missing.
+peers: $(READY)
+	@command -v tshark >/dev/null || { \
+	  [ "$$(id -u)" = 0 ] && SUDO= || SUDO=sudo; \
+	  echo "installing tshark"; $$SUDO apt-get update -qq && \
+	  DEBIAN_FRONTEND=noninteractive $$SUDO apt-get install -y -qq --no-install-recommends tshark >/dev/null; }
+	$(BIN)/python -m pytest -q -m peer
 
 # The page is tested in a real browser: Debian's chromium, installed where it is missing.
 .PHONY: chromium
