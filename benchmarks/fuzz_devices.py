@@ -28,6 +28,10 @@ from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.loadboard import RosTmsBoardSession
 from tms_agents.devices.modbus import StatusRegister, WeighingMap
 from tms_agents.devices.scales import DialectName, ScaleLineSession
+from tms_agents.devices.scanner import ScannerSession
+from tms_agents.devices.text_reader import Rdm6300Parser, TextReaderSession
+from tms_agents.devices.thingmagic.codec import ReplyParser
+from tms_agents.devices.thingmagic.session import ThingMagicSession
 from tms_agents.devices.tr3.codec import MAX_FRAME
 from tms_agents.devices.tr3.codec import FrameParser as Tr3Parser
 from tms_agents.devices.tr3.session import Tr3Session
@@ -114,6 +118,23 @@ _LLRP = [
         "043e0000000a00000008",  # keepalive
     )
 ]
+_THINGMAGIC = [
+    bytes.fromhex(text)
+    for text in (
+        "FF14040000071023000100000320141007010702090000001052 51",  # the firmware starts
+        "FF00970000779E",  # region
+        "FF00930000371A",  # protocol
+        "FF009100001758 FF002A000001E8",  # antenna, buffer cleared
+        "FF04220000000000017BA9",  # one tag found
+        "FF192900000007000102CE110080300030352B2E4401D3000000007BD1002A81",  # here it is
+        "FF0E210000E200322FE20DF9311328B7E3D100AAD0",  # one tag
+        "FF00210400B483",  # none
+    )
+]
+_SCANNER = [b"4901777018686\r", b"]E04901777018686\r\n", b"]C1010490177701868610LOT\x1d21X\n", b"(01)04901777018686\r"]
+_TEXT_READER = [b"E00401004E17F97A\r\n", b"UID: E0:04:01:00:4E:17:F9:7A\n", b"\x024B00E29E3B0C\x03"]
+_RDM_FRAME = 14
+_MOST_THINGMAGIC = 257
 _BOARD = [b"246\r\n", b'"-17"OK\r\n', b"OK\r\n8388607\r\n", b"0\n"]
 _SCALES: dict[DialectName, list[bytes]] = {
     "openscale": [b"12034,0.412,kg,25.81,0,\r\n", b"12,25.81,0,1.0,lbs\r\n", b"0.4,kg,\r\n", b"Readings:\r\n"],
@@ -136,6 +157,16 @@ def _tr3() -> Target:
 def _llrp() -> Target:
     parser = LlrpParser()
     return Target(parser.feed, lambda: parser.pending, MAX_MESSAGE, _LLRP)
+
+
+def _thingmagic() -> Target:
+    parser = ReplyParser()
+    return Target(parser.feed, lambda: parser.pending, _MOST_THINGMAGIC, _THINGMAGIC)
+
+
+def _rdm6300() -> Target:
+    parser = Rdm6300Parser()
+    return Target(parser.feed, lambda: parser.pending, _RDM_FRAME, _TEXT_READER)
 
 
 def _registers() -> Target:
@@ -169,6 +200,15 @@ TARGETS: list[tuple[str, Callable[[], Target]]] = [
     ("tr3 session", _session(lambda clock: Tr3Session(antennas=(0, 1), clock=clock), MAX_FRAME, _TR3)),
     ("llrp messages", _llrp),
     ("llrp session", _session(lambda _: LlrpSession(), MAX_MESSAGE, _LLRP)),
+    ("llrp rounds", _session(lambda _: LlrpSession(antennas=(1, 2), round_s=0.2), MAX_MESSAGE, _LLRP)),
+    ("thingmagic frames", _thingmagic),
+    (
+        "thingmagic session",
+        _session(lambda clock: ThingMagicSession(antennas=(1, 2), clock=clock), _MOST_THINGMAGIC, _THINGMAGIC),
+    ),
+    ("scanner", _session(lambda clock: ScannerSession(clock=clock), _LONGEST_TEXT, _SCANNER)),
+    ("text reader", _session(lambda clock: TextReaderSession(clock=clock), _LONGEST_TEXT, _TEXT_READER)),
+    ("rdm6300 frames", _rdm6300),
     ("load-cell board", _session(lambda clock: RosTmsBoardSession(clock=clock), _LONGEST_TEXT, _BOARD)),
     _scale("openscale"),
     _scale("and"),
