@@ -27,6 +27,8 @@ class Settling:
     before: Array
     variance: Array
     posted: float
+    #: It came with this step: if nothing remains of it, it was nothing.
+    new: bool = True
     looked: bool = False
 
 
@@ -63,10 +65,12 @@ class Bookkeeper:
             assert explanation.thing is not None and explanation.load is not None
             thing = explanation.thing
             if settling is None or settling.thing is not thing:
-                settling = Settling(thing, step.before - thing.load, step.before_variance + thing.variance, step.now)
+                settling = Settling(
+                    thing, step.before - thing.load, step.before_variance + thing.variance, step.now, new=False
+                )
             thing.load = explanation.load
             thing.variance = step.variance - step.before_variance + settling.variance
-            self.settling = Settling(thing, settling.before, settling.variance, step.now)
+            self.settling = Settling(thing, settling.before, settling.variance, step.now, new=settling.new)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events
 
@@ -112,7 +116,7 @@ class Bookkeeper:
             return []
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
-        if float(thing.load.sum()) < 0.4 * self._settings.min_weight_g:
+        if settling.new and float(thing.load.sum()) < 0.4 * self._settings.min_weight_g:
             # It was nothing after all.
             self.settling = None
             del self._shelf.things[thing.id]

@@ -20,6 +20,9 @@ from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step, StepDetector
 
+#: An unclear level that the load left sooner than this was one in passing.
+_PASSING_S = 0.8
+
 
 class CabinetEstimator:
     """One board on load cells with its antenna zones; frame of ``geometry`` in metres, grams, seconds.
@@ -137,9 +140,14 @@ class CabinetEstimator:
             else:
                 self._detector.accept(step)
             return []
-        unsure = best.score < 0.9 or (self._looks_pressed(step, best) and waited < 0.5 * self._settings.patience_s)
+        unsure = best.score < 0.9 or (
+            self._looks_pressed(step, best) and (final or waited < 0.5 * self._settings.patience_s)
+        )
         if unsure and waited < self._settings.patience_s:
             self._detector.hold(step)
+            return []
+        if final and unsure and step.now - step.settled < _PASSING_S:
+            self._detector.ignore(step)
             return []
         return self._take(step, best)
 

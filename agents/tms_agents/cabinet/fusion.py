@@ -23,7 +23,7 @@ import numpy as np
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.position import centre_free, off_board
 from tms_agents.cabinet.settings import EstimatorSettings
-from tms_agents.cabinet.splitting import split
+from tms_agents.cabinet.splitting import path_odds, split
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step
 
@@ -43,6 +43,8 @@ _TWO_TAKEN = 0.03
 #: Two things put at once: usually, and while two tags that are at no stay are in view.
 _TWO_PUT, _TWO_PUT_TAGS = 0.02, 0.2
 _LOOSE_TRIED = 6
+#: How often a thing was measured badly: pressed, or under a leaning arm.
+_LOOSE = 0.01
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
 _HAND_M, _CROWDED_M = 0.015, 0.03
 #: Weights of things are spread evenly in their logarithm between these.
@@ -91,22 +93,24 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
     taken = [evidence.taken(thing) for thing in things]
     for thing, noise, tag in zip(things, noises, taken, strict=True):
         left, both = change + thing.load, variance + noise
-        found.append(Explanation("take", math.log(_PRIOR["take"]) + each + normal(left, both) + tag, removed=(thing,)))
+        found.append(
+            Explanation("take", math.log(_PRIOR["take"]) + each + _loosely(left, both, thing) + tag, removed=(thing,))
+        )
         after = put(left, both)
         if after > -math.inf:
-            found.append(
-                Explanation("swap", math.log(_PRIOR["swap"]) + each + after + tag, removed=(thing,), load=left)
-            )
+            prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
+            found.append(Explanation("swap", prior + after, removed=(thing,), load=left))
             if abs(step.weight_g) < 0.3 * float(thing.load.sum()):
+                aside = path_odds(step, -thing.load, same_thing=True)
                 found.append(
                     Explanation(
                         "slide",
-                        math.log(_PRIOR["slide"]) + each + put.slid(change, left, both),
+                        math.log(_PRIOR["slide"]) + each + put.slid(change, left, both) + max(aside, 0.0),
                         thing=thing,
                         load=left,
                     )
                 )
-            if step.weight_g > 0:
+            if step.weight_g > 0 and not (thing is evidence.settling and evidence.settling_share > 0.3):
                 prior = math.log(_PRIOR["press"]) + each
                 found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
             if thing is evidence.settling and evidence.settling_share > 0.01:
@@ -116,6 +120,12 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
     if step.weight_g > 2 * settings.min_weight_g:
         found += _two_put(step, put, evidence.loose)
     return _normalised(found)
+
+
+def _loosely(left: Array, variance: Array, thing: Thing) -> float:
+    """Log density of what is left when ``thing`` is taken, with a tail for things that were measured badly."""
+    tight, loose = normal(left, variance), normal(left, variance + (0.15 * np.abs(thing.load) + 12.0) ** 2)
+    return float(np.logaddexp(math.log(1 - _LOOSE) + tight, math.log(_LOOSE) + loose))
 
 
 def _crowded(step: Step, shelf: Shelf) -> float:
@@ -135,6 +145,8 @@ def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list
     scores = -0.5 * (left**2 / both + np.log(2 * math.pi * both)).sum(axis=1) + tags[first] + tags[second]
     scores += math.log(_TWO_TAKEN / len(first))
     best = np.argsort(scores)[::-1][:8]
+    for i in best:
+        scores[i] += path_odds(step, -loads[first[i]])
     return [Explanation("take", float(scores[i]), removed=(things[first[i]], things[second[i]])) for i in best]
 
 

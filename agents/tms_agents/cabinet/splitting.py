@@ -7,6 +7,7 @@ is w1 u1 + w2 u2.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,12 @@ from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.steps import Step
 
 _LEAST_BLOCKS = 4
+#: Two changes within less than a block or two are hardly possible.
+_NO_PATH = -6.0
+#: Beyond this a path has other reasons.
+_MOST_ODDS = 10.0
+#: How far aside a hand presses, as a share of what it presses.
+_HAND = 0.06
 
 
 class Split(NamedTuple):
@@ -31,8 +38,9 @@ class Split(NamedTuple):
 
 def split(step: Step) -> Split | None:
     """The step as the sum of two; None where its path is too short to tell."""
-    path, noise = step.path, step.path_variance
+    path = step.path
     count, cells = path.shape
+    noise = step.path_variance + ((_HAND**2 / cells) * (path**2).sum(axis=1))[:, None]
     if count < _LEAST_BLOCKS:
         return None
     sd = np.sqrt(noise.mean(axis=0))
@@ -61,4 +69,34 @@ def split(step: Step) -> Split | None:
     variance = sd**2 * float(errors.sum()) * spread + step.variance
     misfit = float(cost[i, j]) + float((left**2 / (variance / sd**2)).sum())
     first = scale[0] * directions[0] * sd
-    return Split(first, step.change - first, variance, 0.5 * (single - misfit))
+    off = scale[0] * (directions[0] - one * float(one @ directions[0]))
+    return Split(first, step.change - first, variance, 0.5 * (single - misfit) - _freedom(off, count))
+
+
+def path_odds(step: Step, one: Array, *, same_thing: bool = False) -> float:
+    """Log-likelihood ratio that the load went by two changes, ``one`` (k,) and the rest of the step, instead of by one.
+
+    A single change goes straight. Two changes at once leave the straight line, unless they keep exactly the same time.
+    ``same_thing``: it is slid, which also goes straight unless it is pressed meanwhile.
+    """
+    count = len(step.path)
+    if count < 2:
+        return _NO_PATH
+    sd = np.sqrt(step.path_variance.mean(axis=0))
+    straight = step.change / sd
+    straight = straight / max(float(np.linalg.norm(straight)), 1e-9)
+    off = one / sd - straight * float(straight @ (one / sd))
+    size = float(np.linalg.norm(off))
+    if size < 1.0:
+        return 0.0
+    path = step.path / sd
+    aside = path @ (off / size)
+    # A hand does not press exactly on the centre of the thing that it moves.
+    unit = 1.0 + (_HAND * np.linalg.norm(path, axis=1)) ** 2
+    gain = min(0.5 * float((aside**2 / unit).sum() - count), _MOST_ODDS)
+    return gain if same_thing else gain - _freedom(off / math.sqrt(float(unit.mean())), count)
+
+
+def _freedom(off: Array, count: int) -> float:
+    """Price of a path that may leave the straight line as it likes: three times the log of how far, in noise."""
+    return 1.5 * math.log(1.0 + count / 3.0 * 0.1 * float(off @ off))
