@@ -75,6 +75,7 @@ class GraspSection(Section):
     hold_effort: Annotated[float, Field(gt=0)] | None = None
     settle_s: Seconds = 0.3
     lift_m: Distance = 0.1
+    place_m: Distance = 0.3
     hold_s: Seconds = 5.0
     tag_wait_s: Seconds = 2.0
     sure: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
@@ -86,7 +87,7 @@ class GraspSection(Section):
     gap_s: Seconds = 5.0
     step_m: Distance = 0.1
     step_s: Seconds = 0.5
-    p_held: Chance = 0.8
+    p_read: Chance = 0.8
 
 
 class HandSection(Section):

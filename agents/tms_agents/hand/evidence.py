@@ -1,14 +1,15 @@
 """Which of the tags in view is the one in the hand: a likelihood per tag, place by place.
 
-A look is one completed round of the reader, or a short span of time of a reader that reports without rounds. The tag in
-the hand is read in most looks wherever the hand goes (``p_held``). A neighbour is in the reader's field or not, by
-place: where it is, it is read just as often as the held one; where not, hardly ever (``p_stray``). So many looks at one
-place say little, and some looks at several places say much. With h reads in n looks at one place,
+A look is one completed round of the reader, or a short span of time of a reader that reports without rounds. A tag is
+in the reader's field or not, by place: in the field it is read in a look with ``p_read``, elsewhere hardly ever
+(``p_stray``). The tag in the hand is in the field wherever the hand goes, but for places where the thing, the hand or
+the robot shades it (``shaded``). A neighbour is in the field where the hand closed, among the things of a shelf, with
+probability ``near``, and at any other place with ``passing``. So many looks at one place say little, and some looks at
+several places say much. With h reads in n looks at a place, A = p_read^h (1 - p_read)^(n-h) and B likewise of p_stray,
 
-  log P(looks | held) / P(looks | neighbour) = -log(q + (1 - q) (p_stray / p_held)^h ((1-p_stray) / (1-p_held))^(n-h))
+  P(looks | held) / P(looks | neighbour) = ((1 - shaded) A + shaded B) / (q A + (1 - q) B)   with q = near or passing.
 
-where q is the probability that a neighbour is in the field: ``near`` where the hand closed (it reached among the things
-of a shelf), ``passing`` elsewhere. "Nothing that can be read is in the hand" is one more hypothesis (``p_none``).
+"Nothing that can be read is in the hand" is one more hypothesis (``p_none``).
 """
 
 from __future__ import annotations
@@ -16,9 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-#: Bounds of the log-likelihood ratio of one place and of all: one place where the thing itself shades its tag proves
-#: nothing, and what was seen long ago must not outweigh for ever what is seen now.
-_MOST_OF_A_PLACE = 4.0
+#: Bound of the log-likelihood ratio: what was seen long ago must not outweigh for ever what is seen now.
 _MOST = 8.0
 _MOST_TAGS = 200
 
@@ -27,8 +26,9 @@ _MOST_TAGS = 200
 class ReadModel:
     """Probabilities; see above."""
 
-    p_held: float = 0.8
+    p_read: float = 0.8
     p_stray: float = 0.02
+    shaded: float = 0.15
     near: float = 0.5
     passing: float = 0.1
     p_none: float = 0.1
@@ -54,7 +54,7 @@ class TagEvidence:
     def elsewhere(self) -> None:
         """The hand has come to another place."""
         ratios = self._ratios()
-        self._unseen = _bounded(self._unseen + self._here(0), _MOST)
+        self._unseen = _bounded(self._unseen + self._here(0))
         self._before, self._reads, self._looks = ratios, {}, 0
         self._in_field = self._model.passing
 
@@ -82,18 +82,19 @@ class TagEvidence:
     def _ratios(self) -> dict[str, float]:
         tags = self._before.keys() | self._reads.keys()
         return {
-            tag: _bounded(self._before.get(tag, self._unseen) + self._here(self._reads.get(tag, 0)), _MOST)
+            tag: _bounded(self._before.get(tag, self._unseen) + self._here(self._reads.get(tag, 0)))
             for tag in sorted(tags)
         }
 
     def _here(self, reads: int) -> float:
         model, misses = self._model, self._looks - reads
-        other = reads * math.log(model.p_stray / model.p_held)
-        other += misses * math.log((1.0 - model.p_stray) / (1.0 - model.p_held))
-        # exp(700) is the largest that a float can hold.
-        ratio = -math.log(self._in_field + (1.0 - self._in_field) * math.exp(min(other, 700.0)))
-        return _bounded(ratio, _MOST_OF_A_PLACE)
+        in_field = reads * math.log(model.p_read) + misses * math.log(1.0 - model.p_read)
+        outside = reads * math.log(model.p_stray) + misses * math.log(1.0 - model.p_stray)
+        most = max(in_field, outside)  # after many looks both are too small for a float
+        a, b, q = math.exp(in_field - most), math.exp(outside - most), self._in_field
+        held, neighbour = (1.0 - model.shaded) * a + model.shaded * b, q * a + (1.0 - q) * b
+        return math.log(held / neighbour)
 
 
-def _bounded(ratio: float, most: float) -> float:
-    return max(-most, min(most, ratio))
+def _bounded(ratio: float) -> float:
+    return max(-_MOST, min(_MOST, ratio))

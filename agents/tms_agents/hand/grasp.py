@@ -171,8 +171,10 @@ class Grasp:
         if t - since < settings.drop_s:
             return []
         if not self.told:
+            found: list[GraspEvent] = [] if self._lifted is None else [self._grasped(t), Dropped(since, self._met)]
             self._enter("empty", t)
-            return []
+            self._begin()
+            return found
         if self.tag is not None and self._looks.alive:
             # A tag that was read after the fingers met is of something thin: then it takes more to say that it fell.
             thin = self._last_read > since + settings.drop_s
@@ -296,7 +298,7 @@ class Grasp:
             return
         if self._anchor is None:
             self._anchor = self.spot
-        elif gap(self.spot, self._anchor) > self.settings.lift_m:
+        elif gap(self.spot, self._anchor) > self.settings.place_m:
             self._anchor = self.spot
             self._evidence.elsewhere()
 

@@ -170,6 +170,8 @@ class Robot:
         before: list[Observation] = []
         if hand.shares is not None:
             if not self._splits(hand, event):
+                if isinstance(event, Released | Dropped):
+                    hand.shares = None
                 return []
             before = self._own(hand, at)
         match event:
@@ -221,7 +223,8 @@ class Robot:
 
     def _taker(self, giver: str) -> _Hand | None:
         """The hand that has closed on what this one lets go."""
-        return next((one for one in self._hands.values() if one.shares == giver), None)
+        hands = self._hands.values()
+        return next((one for one in hands if one.shares == giver and one.grasp.phase == "holding"), None)
 
     def _pass_on(self, giver: _Hand, taker: _Hand, at: datetime) -> list[Observation]:
         """From one hand to the other: a transfer, so that the object goes along whatever it is."""

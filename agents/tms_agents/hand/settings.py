@@ -16,7 +16,8 @@ class GraspSettings:
 
     Args:
         settle_s: fingers that stood still for this long have closed.
-        lift_m: so far from where it closed, the hand has lifted what it holds. Also what counts as another place.
+        lift_m: so far from where it closed, the hand has lifted what it holds.
+        place_m: so far away, the reader is among other tags: its range, and a little more.
         hold_s: a thing held for this long where the hand closed counts as lifted too (somebody put it into the hand).
         tag_wait_s: a lifted thing is told without a tag after this; its tag may follow.
         sure: probability from which on a tag is taken for the one in the hand.
@@ -33,6 +34,7 @@ class GraspSettings:
     reads: ReadModel = _READS
     settle_s: float = 0.3
     lift_m: float = 0.1
+    place_m: float = 0.3
     hold_s: float = 5.0
     tag_wait_s: float = 2.0
     sure: float = 0.95
