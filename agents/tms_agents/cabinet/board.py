@@ -19,8 +19,9 @@ from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.transport import DeviceState
 
 log = logging.getLogger(__name__)
-#: A fault is over when the samples were good for so long: states that flicker tell nothing.
-_GOOD_S = 1.0
+#: A fault is told when the samples were bad for so long (an answer may be late on a busy computer), and is over when
+#: they were good for so long: states that flicker tell nothing.
+_BAD_S, _GOOD_S = 0.5, 1.0
 #: A filtered device repeats its number at rest. This much, one way and the other, tells that from a stuck cell.
 _DITHER_G = 1e-3
 
@@ -36,7 +37,10 @@ class Board:
         self._filtered = all(one.filtered for one in section.load)
         self._dither = _DITHER_G
         self._link: DeviceState | None = None
-        self._fault, self._fault_at = "", float("-inf")
+        self._fault = ""
+        #: When the samples were good last, and bad last.
+        self._good_at: float | None = None
+        self._bad_at = float("-inf")
         #: Grams of every cell of the device at the last sample, NaN where unusable.
         self.grams: NDArray[np.float64] = np.full(section.cell_count, np.nan)
 
@@ -59,7 +63,7 @@ class Board:
             self._continuity.interrupted()
             self.estimator.load(t, np.full(self.geometry.count, np.nan))
             self.grams = np.full_like(self.grams, np.nan)
-            self._fault = ""
+            self._fault, self._good_at = "", None
         self._link = state
 
     def sample(self, t: float, sample: LoadSample) -> list[CabinetEvent]:
@@ -110,11 +114,17 @@ class Board:
             fault = f"cell {', '.join(map(str, bad))} does not measure"
         if fault:
             self._failing(t, fault)
-        elif self._fault and t - self._fault_at > _GOOD_S:
+            return
+        self._good_at = t
+        if self._fault and t - self._bad_at > _GOOD_S:
             self._fault = ""
 
     def _failing(self, t: float, fault: str) -> None:
-        self._fault, self._fault_at = fault, t
+        self._bad_at = t
+        if self._good_at is None:
+            self._good_at = t
+        if self._fault or t - self._good_at >= _BAD_S:
+            self._fault = fault
 
     def _unusable(self) -> list[int]:
         """Cells that deliver nothing or the same number for too long."""

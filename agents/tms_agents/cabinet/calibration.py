@@ -153,7 +153,8 @@ def _fit_with_positions(
 ) -> tuple[Floats, Floats, Floats, float]:
     """Positions unknown: the totals give the gains, the moments gain times position."""
     condition = _condition(differences / np.abs(differences).max(axis=0))
-    unknown: Floats = np.linalg.lstsq(differences, np.column_stack([weights, weights[:, None] * spots]), rcond=None)[0]
+    right = np.column_stack([weights, weights[:, None] * spots])
+    unknown = np.asarray(np.linalg.lstsq(differences, right, rcond=None)[0], dtype=np.float64)
     gain = unknown[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         at = np.asarray(unknown[:, 1:] / gain[:, None])

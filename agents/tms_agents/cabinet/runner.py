@@ -10,16 +10,14 @@ from collections.abc import Callable, Mapping
 
 from tms_agents.cabinet.calibration_file import BoardCalibration
 from tms_agents.cabinet.clocks import Clocks
-from tms_agents.cabinet.config import BoardSection, CabinetConfig, ReaderSection
+from tms_agents.cabinet.config import CabinetConfig
 from tms_agents.cabinet.core import Cabinet
+from tms_agents.cabinet.listening import listen_to_board, listen_to_reader, tick
 from tms_agents.cabinet.live import serve_view, socket_path
-from tms_agents.cabinet.sources import open_loads
 from tms_agents.cabinet.state import load_state, save_state, state_path
 from tms_agents.cabinet.view import view_of
 from tms_agents.cabinet.weights import Weights, weights_path
 from tms_agents.devices.transport import DeviceState
-from tms_agents.readers import open_reader
-from tms_agents.readers.opening import Seen
 from tms_agents.running import Posted, Running, running
 from tms_client.cli import CommandError
 from tms_schemas.observation import Observation
@@ -91,10 +89,11 @@ class _Work:
         self._post([self._cabinet.inventory()])
         async with asyncio.TaskGroup() as tasks:
             for board in self._config.boards:
-                tasks.create_task(self._listen_to_board(board))
+                tasks.create_task(listen_to_board(self._cabinet, board, self._found, self._came_back))
             for reader in self._config.readers:
-                tasks.create_task(self._listen_to_reader(reader))
-            for work in (self._tick, self._learn_weights, self._send, self._save):
+                tasks.create_task(listen_to_reader(self._cabinet, reader, self._found))
+            tasks.create_task(tick(self._cabinet, self._found))
+            for work in (self._look_after, self._learn_weights, self._send, self._save):
                 tasks.create_task(work())
             tasks.create_task(
                 serve_view(socket_path(self._config.spool.path), lambda: view_of(self._cabinet, self._clocks, "agent"))
@@ -106,32 +105,9 @@ class _Work:
             await self._agent.observations(*self._outbox.get_nowait())
         self._save_now()
 
-    async def _listen_to_board(self, board: BoardSection) -> None:
-        source = open_loads(board.load, self._config.silent_after_s)
-        async with contextlib.aclosing(source.listen()) as items:
-            async for item in items:
-                if isinstance(item, DeviceState):
-                    self._cabinet.board_line(board.name, item)
-                    self._came_back(item)
-                else:
-                    self._post(self._cabinet.samples(board.name, item))
-
-    async def _listen_to_reader(self, reader: ReaderSection) -> None:
-        field = self._cabinet.readers[reader.name].field
-        arrivals = open_reader(reader.source, silent_after_s=reader.silent_after_s, field=field)
-        async with contextlib.aclosing(arrivals):
-            async for _, item in arrivals:
-                if isinstance(item, DeviceState):
-                    self._cabinet.reader_line(reader.name, item)
-                else:
-                    self._found(
-                        *self._cabinet.reads(reader.name, [one.read if isinstance(one, Seen) else one for one in item])
-                    )
-
-    async def _tick(self) -> None:
+    async def _look_after(self) -> None:
         while True:
             await asyncio.sleep(_TICK_S)
-            self._found(*self._cabinet.tick())
             await self._tell_states()
             if self._inventory_at is not None and self._clocks.now() >= self._inventory_at:
                 self._inventory_at = None

@@ -10,6 +10,16 @@ from pydantic import Field, model_validator
 from tms_agents.config import Section
 from tms_agents.devices.loadboard import RosTmsBoardSession
 from tms_agents.devices.loads import LoadSample, LoadSource
+from tms_agents.devices.modbus import (
+    Kind as RegisterKind,
+)
+from tms_agents.devices.modbus import (
+    ModbusLink,
+    StatusRegister,
+    WeighingMap,
+    modbus_rtu,
+    modbus_tcp,
+)
 from tms_agents.devices.scales import DIALECTS, DialectName, LoadGroup, Mode, ScaleLineSession
 from tms_agents.devices.transport import Link, Opener, Session, serial, tcp
 from tms_agents.readers import Port
@@ -25,11 +35,13 @@ class _Line(Section):
     host: str | None = None
     port: Port | None = None
 
+    default_port: ClassVar[int | None] = None
+
     @model_validator(mode="after")
     def _one_way(self) -> _Line:
         if (self.device is None) == (self.host is None):
             raise ValueError("give either device (serial) or host and port (TCP)")
-        if self.host is not None and self.port is None:
+        if self.host is not None and self.port is None and self.default_port is None:
             raise ValueError("host needs port")
         if self.host is not None and self.baud is not None:
             raise ValueError("baud belongs to a serial device, not to host")
@@ -37,7 +49,7 @@ class _Line(Section):
 
     @property
     def place(self) -> str:
-        return self.device or f"{self.host}:{self.port}"
+        return self.device or f"{self.host}:{self.port or self.default_port}"
 
     def opener(self, baud: int, *, bits: int = 8, parity: str = "N") -> Opener:
         if self.device is not None:
@@ -103,10 +115,71 @@ class Scale(_Line):
         )
 
 
-LoadSection = Annotated[RosTmsBoard | Scale, Field(discriminator="kind")]
+class StatusSection(Section):
+    """A module's status register; masks of bits, ``faults`` by mask (as "0x20")."""
+
+    address: Annotated[int, Field(ge=0, le=65_534)]
+    stable: Annotated[int, Field(ge=0, le=0xFFFF)] = 0
+    unstable: Annotated[int, Field(ge=0, le=0xFFFF)] = 0
+    valid: Annotated[int, Field(ge=0, le=0xFFFF)] = 0
+    faults: dict[Annotated[str, Field(pattern=r"^(0x[0-9a-fA-F]{1,4}|\d{1,5})$")], str] = {}
+
+    def register(self) -> StatusRegister:
+        values = self.model_dump(exclude={"faults"})
+        return StatusRegister(**values, faults={int(mask, 0): text for mask, text in self.faults.items()})
 
 
-def open_loads(sections: Sequence[RosTmsBoard | Scale], silent_after_s: float) -> LoadSource:
+class ModbusModule(_Line):
+    """A weighing module, RTU (``device``) or TCP (``host``, ``port`` 502); ``registers``: the first of each cell."""
+
+    kind: Literal["modbus"]
+    registers: Annotated[list[Annotated[int, Field(ge=0, le=65_534)]], Field(min_length=1, max_length=36)]
+    #: Grams per unit; 1 with ``raw`` values, which are calibrated here.
+    scale: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+    raw: bool = False
+    device_id: Annotated[int, Field(ge=0, le=247)] = 1
+    function: Literal[3, 4] = 3
+    number: RegisterKind = "int32"
+    low_word_first: bool = False
+    parity: Literal["N", "E", "O"] = "N"
+    period_s: Annotated[float, Field(ge=0.01, le=10)] = 0.05
+    status: StatusSection | None = None
+
+    default_port: ClassVar[int | None] = 502
+    zeroes_itself: ClassVar[bool] = False
+
+    @property
+    def cell_count(self) -> int:
+        return len(self.registers)
+
+    @property
+    def filtered(self) -> bool:
+        return not self.raw
+
+    def link(self, silent_after_s: float) -> LoadSource:
+        where = (
+            modbus_rtu(self.device, self.baud or 9600, parity=self.parity)
+            if self.device is not None
+            else modbus_tcp(self.host or "", self.port or 502)
+        )
+        registers = WeighingMap(
+            cells=self.registers,
+            device_id=self.device_id,
+            function=self.function,
+            kind=self.number,
+            low_word_first=self.low_word_first,
+            scale=self.scale,
+            status=None if self.status is None else self.status.register(),
+        )
+        return ModbusLink(
+            where, registers, name=f"module {self.place}", period_s=self.period_s, silent_after_s=silent_after_s
+        )
+
+
+LoadSection = Annotated[RosTmsBoard | Scale | ModbusModule, Field(discriminator="kind")]
+
+
+def open_loads(sections: Sequence[RosTmsBoard | Scale | ModbusModule], silent_after_s: float) -> LoadSource:
     """One source for all cells of a board."""
     links = [one.link(silent_after_s) for one in sections]
     if len(links) == 1:

@@ -18,13 +18,18 @@ def state_path(spool: Path) -> Path:
     return spool.with_name(spool.name + ".state.json")
 
 
+def peek_state(path: Path, agent: str) -> dict[str, Any]:
+    """What was saved, for somebody who only looks; nothing where that cannot be used."""
+    try:
+        return _read(path, agent)
+    except (OSError, ValueError):
+        return {}
+
+
 def load_state(path: Path, agent: str) -> dict[str, Any]:
     """What was saved; nothing where there is no file, or one that cannot be used (kept beside it, as ``.broken``)."""
     try:
-        saved = json.loads(path.read_bytes())
-        if not isinstance(saved, dict) or saved.get("format") != _FORMAT or saved.get("agent") != agent:
-            raise ValueError("it is of another agent or format")
-        return saved
+        return _read(path, agent)
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
@@ -42,3 +47,10 @@ def save_state(path: Path, agent: str, state: dict[str, Any]) -> bool:
         log.warning("state %s: %s", path, error)
         return False
     return True
+
+
+def _read(path: Path, agent: str) -> dict[str, Any]:
+    saved = json.loads(path.read_bytes())
+    if not isinstance(saved, dict) or saved.get("format") != _FORMAT or saved.get("agent") != agent:
+        raise ValueError("it is of another agent or format")
+    return saved

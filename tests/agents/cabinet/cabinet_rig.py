@@ -1,4 +1,4 @@
-"""A cabinet for tests: things on an emulated board behind a real terminal, its configuration, the agent as a process."""
+"""A cabinet for tests: things on an emulated board, its configuration, the agent as a process."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import numpy as np
-
-from tms_agents.simulation.board_plate import load_shares
 
 WIDTH, DEPTH = 0.465, 0.317
 CELLS = ((0.04, 0.047), (0.425, 0.047), (0.04, 0.27), (0.425, 0.27))
@@ -27,7 +25,6 @@ class Shelf:
         self.things: dict[str, tuple[float, float, float]] = {}
         self.noise_g = noise_g
         self.zero_g = np.zeros(4)
-        self._shares = load_shares(CELLS)
         self._random = np.random.default_rng(7)
 
     def put(self, name: str, grams: float, x: float, y: float) -> None:
@@ -37,8 +34,13 @@ class Shelf:
         del self.things[name]
 
     def grams(self) -> np.ndarray:
-        moments = sum((np.array([w, w * x, w * y]) for w, x, y in self.things.values()), np.zeros(3))
-        return self._shares @ moments
+        """On each cell: a stiff board on four equal springs."""
+        cells = np.array(CELLS)
+        middle, reach = cells.mean(axis=0), np.ptp(cells, axis=0) / 2
+        loads = np.zeros(4)
+        for grams, x, y in self.things.values():
+            loads += grams / 4 * (1 + ((cells - middle) / reach**2) @ (np.array([x, y]) - middle))
+        return loads
 
     def total(self, _: float = 0.0) -> float:
         """What a scale under all of it shows."""
