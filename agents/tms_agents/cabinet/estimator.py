@@ -140,9 +140,7 @@ class CabinetEstimator:
             else:
                 self._detector.accept(step)
             return []
-        unsure = best.score < 0.9 or (
-            self._looks_pressed(step, best) and (final or waited < 0.5 * self._settings.patience_s)
-        )
+        unsure = best.score < 0.9 or not best.tight or self._held(step, best, waited)
         if unsure and waited < self._settings.patience_s:
             self._detector.hold(step)
             return []
@@ -151,12 +149,17 @@ class CabinetEstimator:
             return []
         return self._take(step, best)
 
-    def _looks_pressed(self, step: Step, best: Explanation) -> bool:
-        """A thing that must be one of some known weights, and is of none of them: a hand still holds it."""
-        weights = [weight for weight in self._namer.loose().values() if weight is not None]
-        if best.load is None or best.kind not in ("put", "swap") or not weights:
+    def _held(self, step: Step, best: Explanation, waited: float) -> bool:
+        """Whether a new load looks like a hand or an arm: of no weight that its tag could have, or without any tag."""
+        if best.load is None or best.kind not in ("put", "swap"):
+            return False
+        loose = self._namer.loose()
+        if not loose:
+            return waited < self._settings.untagged_s
+        if None in loose.values() or _PASSING_S < waited < math.inf:
             return False
         weight, sd = float(best.load.sum()), math.sqrt(float(step.variance.sum()))
+        weights = [known for known in loose.values() if known is not None]
         return all(abs(weight - known.mean_g) > 4 * math.hypot(sd, known.sd_g) + 2.0 for known in weights)
 
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:

@@ -65,6 +65,8 @@ class Explanation:
     second: Array | None = None
     variance: Array | None = None
     tags: tuple[str, ...] = ()
+    #: The load fits within its noise.
+    tight: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
     put = PutDensity(geometry, settings.min_weight_g, weights)
     things = list(shelf.things.values())
     found = [
-        Explanation("put", math.log(_PRIOR["put"]) + put(change, variance) + _crowded(step, shelf), load=change),
+        Explanation("put", math.log(_PRIOR["put"]) + put(change, variance) + _crowded(change, shelf), load=change),
         Explanation("unknown", math.log(_PRIOR["unknown"]) + put.anything(change, variance)),
     ]
     each = math.log(1.0 / max(len(things), 1))
@@ -93,23 +95,21 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
     taken = [evidence.taken(thing) for thing in things]
     for thing, noise, tag in zip(things, noises, taken, strict=True):
         left, both = change + thing.load, variance + noise
-        found.append(
-            Explanation("take", math.log(_PRIOR["take"]) + each + _loosely(left, both, thing) + tag, removed=(thing,))
-        )
+        tight, loose = _remaining(left, both, thing)
+        prior = math.log(_PRIOR["take"]) + each + tag
+        both_ways = float(np.logaddexp(tight, loose))
+        found.append(Explanation("take", prior + both_ways, removed=(thing,), tight=tight > loose))
         after = put(left, both)
         if after > -math.inf:
             prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
-            found.append(Explanation("swap", prior + after, removed=(thing,), load=left))
-            if abs(step.weight_g) < 0.3 * float(thing.load.sum()):
-                aside = path_odds(step, -thing.load, same_thing=True)
-                found.append(
-                    Explanation(
-                        "slide",
-                        math.log(_PRIOR["slide"]) + each + put.slid(change, left, both) + max(aside, 0.0),
-                        thing=thing,
-                        load=left,
-                    )
-                )
+            crowd = _crowded(left, shelf, thing)
+            found.append(Explanation("swap", prior + after + crowd, removed=(thing,), load=left))
+            if abs(step.weight_g) < 0.5 * float(thing.load.sum()):
+                prior = math.log(_PRIOR["slide"]) + each
+                prior += min(max(path_odds(step, -thing.load, same_thing=True), 0.0), 25.0)
+                still, pressed = put.slid(change, left, both)
+                found.append(Explanation("slide", prior + still, thing=thing, load=left))
+                found.append(Explanation("press", prior + math.log(_PRIOR["press"]) + pressed, thing=thing))
             if step.weight_g > 0 and not (thing is evidence.settling and evidence.settling_share > 0.3):
                 prior = math.log(_PRIOR["press"]) + each
                 found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
@@ -122,16 +122,18 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
     return _normalised(found)
 
 
-def _loosely(left: Array, variance: Array, thing: Thing) -> float:
-    """Log density of what is left when ``thing`` is taken, with a tail for things that were measured badly."""
-    tight, loose = normal(left, variance), normal(left, variance + (0.15 * np.abs(thing.load) + 12.0) ** 2)
-    return float(np.logaddexp(math.log(1 - _LOOSE) + tight, math.log(_LOOSE) + loose))
+def _remaining(left: Array, variance: Array, thing: Thing) -> tuple[float, float]:
+    """Log densities of what is left when ``thing`` is taken: measured well, and badly."""
+    loose = normal(left, variance + (0.15 * np.abs(thing.load) + 12.0) ** 2)
+    return math.log(1 - _LOOSE) + normal(left, variance), math.log(_LOOSE) + loose
 
 
-def _crowded(step: Step, shelf: Shelf) -> float:
-    """Log of the room that the things on the board leave for another one where the step is."""
-    at = np.array(centre_free(step.change, shelf.geometry))
-    near = [float(np.hypot(*(at - thing.centre(shelf.geometry).xy))) for thing in shelf.things.values()]
+def _crowded(load: Array, shelf: Shelf, gone: Thing | None = None) -> float:
+    """Log of the room that the things on the board, without the one that is ``gone``, leave for a new one."""
+    at = np.array(centre_free(load, shelf.geometry))
+    near = [
+        float(np.hypot(*(at - thing.centre(shelf.geometry).xy))) for thing in shelf.things.values() if thing is not gone
+    ]
     return math.log(1.0 - 0.95 * math.exp(-0.5 * (min(near) / _CROWDED_M) ** 2)) if near else 0.0
 
 
@@ -222,12 +224,13 @@ class PutDensity:
             + self._jacobian
         )
 
-    def slid(self, change: Array, load: Array, variance: Array) -> float:
-        """Density of a step that leaves the weight and makes ``load`` of a thing's load vector."""
-        weight, sd2 = float(load.sum()), float(variance.sum())
+    def slid(self, change: Array, load: Array, variance: Array) -> tuple[float, float]:
+        """Densities of a step that makes ``load`` of a thing's load vector: with its weight, or still pressed."""
+        weight, sd2, more = float(load.sum()), float(variance.sum()), float(change.sum())
         place = off_board(load, variance, self._geometry) - math.log(self._area) - 2 * math.log(weight)
-        total = -0.5 * (float(change.sum()) ** 2 / sd2 + math.log(2 * math.pi * sd2))
-        return total + place + self._twist(load, variance, weight) + self._jacobian
+        place += self._twist(load, variance, weight) + self._jacobian
+        still = -0.5 * (more**2 / sd2 + math.log(2 * math.pi * sd2))
+        return still + place, (-math.log(weight) if more > 0 else -math.inf) + place
 
     def anything(self, change: Array, variance: Array) -> float:
         """Density of a change that no thing makes: any size and sign, shared among the cells in any way."""

@@ -46,6 +46,8 @@ class EstimatorSettings:
     #: An unexplained or ambiguous change is held this long in the hope of more samples or tag reads.
     patience_s: float = 2.0
 
+    #: A load without a tag must be steady this long: it may be an arm that leans on the board.
+    untagged_s: float = 0.9
     #: A change that nothing explains (a hand that presses, a thing half lifted) becomes the new zero only after this.
     stubborn_s: float = 4.0
 

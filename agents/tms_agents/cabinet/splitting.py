@@ -93,8 +93,8 @@ def path_odds(step: Step, one: Array, *, same_thing: bool = False) -> float:
     aside = path @ (off / size)
     # A hand does not press exactly on the centre of the thing that it moves.
     unit = 1.0 + (_HAND * np.linalg.norm(path, axis=1)) ** 2
-    gain = min(0.5 * float((aside**2 / unit).sum() - count), _MOST_ODDS)
-    return gain if same_thing else gain - _freedom(off / math.sqrt(float(unit.mean())), count)
+    gain = 0.5 * float((aside**2 / unit).sum() - count)
+    return gain if same_thing else min(gain, _MOST_ODDS) - _freedom(off / math.sqrt(float(unit.mean())), count)
 
 
 def _freedom(off: Array, count: int) -> float:
