@@ -132,7 +132,8 @@ _THINGMAGIC = [
     )
 ]
 _SCANNER = [b"4901777018686\r", b"]E04901777018686\r\n", b"]C1010490177701868610LOT\x1d21X\n", b"(01)04901777018686\r"]
-_TEXT_READER = [b"E00401004E17F97A\r\n", b"UID: E0:04:01:00:4E:17:F9:7A\n", b"\x024B00E29E3B0C\x03"]
+_TEXT_READER = [b"E00401004E17F97A\r\n", b"UID: E0:04:01:00:4E:17:F9:7A\n"]
+_RDM6300 = [b"\x024B00E29E3B0C\x03", b"\x02" + b"0123456789" + b"89" + b"\x03"]
 _RDM_FRAME = 14
 _MOST_THINGMAGIC = 257
 _BOARD = [b"246\r\n", b'"-17"OK\r\n', b"OK\r\n8388607\r\n", b"0\n"]
@@ -166,7 +167,7 @@ def _thingmagic() -> Target:
 
 def _rdm6300() -> Target:
     parser = Rdm6300Parser()
-    return Target(parser.feed, lambda: parser.pending, _RDM_FRAME, _TEXT_READER)
+    return Target(parser.feed, lambda: parser.pending, _RDM_FRAME, _RDM6300)
 
 
 def _registers() -> Target:

@@ -73,10 +73,16 @@ def decode(line: str) -> Scan | Misread:
     return Scan(code[1:] if len(code) == 14 and code[0] == "0" else code)
 
 
+def product_code(line: str) -> str | None:
+    """The digits of the product code of a scanned line, None where there is none or it was misread."""
+    found = decode(line)
+    return found.code if isinstance(found, Scan) else None
+
+
 def _gtin(elements: str) -> str | None:
     """The value of application identifier 01: in an element string, in one as printed, in a GS1 Digital Link."""
     if found := _WRITTEN.match(elements):
-        return (found[1] or found[2]).zfill(14)
+        return found[1] or found[2]
     at = 0
     while at < len(elements):
         if elements.startswith("01", at):

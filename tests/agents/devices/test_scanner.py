@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.devices.emulation import PtyLine, TcpLine
-from tms_agents.devices.scanner import Misread, Scan, ScannerSession, check_digit, decode
+from tms_agents.devices.scanner import Misread, Scan, ScannerSession, check_digit, decode, product_code
 from tms_agents.devices.scanner_emulator import ScannerDevice
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
 
@@ -73,6 +73,7 @@ def test_one_wrong_digit_is_always_noticed(code, data):
 def test_what_scanners_send(line, code):
     found = decode(line)
     assert found == Scan(code) if code else isinstance(found, Misread)
+    assert product_code(line) == code
 
 
 elements = st.lists(
