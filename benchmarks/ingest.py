@@ -1,9 +1,10 @@
 """CPU time of durable ingest against a bare FastAPI endpoint that validates and drops the same body.
 
-    python benchmarks/ingest.py [--seconds 4] [--postgres-url postgresql://...]
+    python benchmarks/ingest.py [--seconds 1] [--rounds 5] [--postgres-url postgresql://...]
 
 Every server is a process of its own; its CPU time is read from outside (/proc), so the load generator does not count.
-PostgreSQL's own processes do not count either. Without a URL one is started. ``log``: durable ingest alone, the fold is
+PostgreSQL's own processes do not count either. Without a URL one is started. Yardstick and server take turns, and the
+ratio is the median over the rounds: other work on the machine meets both. ``log``: durable ingest alone, the fold is
 held back; ``no objects``: the fold follows, in a room where nothing is tracked; ``10 objects``: where things are.
 """
 
@@ -22,6 +23,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from statistics import median
 from typing import Any, NamedTuple
 
 import httpx
@@ -38,6 +40,8 @@ class Result(NamedTuple):
     server: str
     batch: int
     us_per_observation: float
+    bare_us_per_observation: float
+    ratio: float
     observations_per_s: float
 
 
@@ -101,19 +105,32 @@ async def load(url: str, batch: int, seconds: float, run: str) -> int:
         return sum(await asyncio.gather(*(agent(f"{run}{n}", http) for n in range(CONNECTIONS))))
 
 
-def measure(server: str, url: str, pid: int, seconds: float) -> list[Result]:
-    results = []
-    for batch in (1, 50):
-        asyncio.run(load(url, batch, 0.5, f"warm{batch}x"))
-        before, start = cpu_s(pid), time.monotonic()
-        sent = asyncio.run(load(url, batch, seconds, f"run{batch}x"))
-        settle(url, pid)
-        used, wall = cpu_s(pid) - before, time.monotonic() - start
-        results.append(Result(server, batch, used / sent * 1e6, sent / wall))
-    return results
+def compare(name: str, server: Server, bare: Server, batch: int, seconds: float, rounds: int) -> Result:
+    """The server and the yardstick in turns."""
+    for one in (server, bare):
+        asyncio.run(load(one.url, batch, 0.5, f"warm{batch}x"))
+        settle(one.pid)
+    pairs = [[turn(one, batch, seconds, f"run{batch}x{n}x") for one in (server, bare)] for n in range(rounds)]
+    of_server, of_bare = zip(*pairs, strict=True)
+    return Result(
+        name,
+        batch,
+        median(used for used, _ in of_server),
+        median(used for used, _ in of_bare),
+        median(ours / bares for (ours, _), (bares, _) in pairs),
+        median(rate for _, rate in of_server),
+    )
 
 
-def settle(url: str, pid: int) -> None:
+def turn(server: Server, batch: int, seconds: float, run: str) -> tuple[float, float]:
+    """Microseconds of CPU per observation, and observations per second."""
+    before, began = cpu_s(server.pid), time.monotonic()
+    sent = asyncio.run(load(server.url, batch, seconds, run))
+    settle(server.pid)
+    return (cpu_s(server.pid) - before) / sent * 1e6, sent / (time.monotonic() - began)
+
+
+def settle(pid: int) -> None:
     """Wait until the server has folded what it took: that work belongs to the measurement."""
     last = -1.0
     while (now := cpu_s(pid)) - last > 0.02:
@@ -127,8 +144,13 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
 
 
+class Server(NamedTuple):
+    url: str
+    pid: int
+
+
 @contextmanager
-def serving(arguments: list[str], **env: str) -> Iterator[tuple[str, int]]:
+def serving(arguments: list[str], **env: str) -> Iterator[Server]:
     """A server process on a free port, ready."""
     port = free_port()
     command = [sys.executable, *(argument.replace("PORT", str(port)) for argument in arguments)]
@@ -141,27 +163,27 @@ def serving(arguments: list[str], **env: str) -> Iterator[tuple[str, int]]:
                     break
             except httpx.TransportError:
                 time.sleep(0.1)
-        yield url, process.pid
+        yield Server(url, process.pid)
     finally:
         process.terminate()
         process.wait(60)
 
 
 @contextmanager
-def town(database_url: str | None, *, objects: int, holdback_s: float) -> Iterator[tuple[str, int]]:
+def town(database_url: str | None, *, objects: int, holdback_s: float) -> Iterator[Server]:
     """``tms serve`` with one room and some objects."""
     with tempfile.TemporaryDirectory() as folder:
         cache = os.environ.get("NUMBA_CACHE_DIR", str(Path.cwd() / ".tms" / "compiled"))
         arguments = ["-m", "tms_client", "serve", "--data-dir", folder, "--port", "PORT"]
         if database_url:
             arguments += ["--database-url", database_url]
-        with serving(arguments, NUMBA_CACHE_DIR=cache, TMS_HOLDBACK_S=str(holdback_s)) as (url, pid):
+        with serving(arguments, NUMBA_CACHE_DIR=cache, TMS_HOLDBACK_S=str(holdback_s)) as server:
             outline = [[0, 0], [8, 0], [8, 6], [0, 6]]
-            httpx.put(f"{url}/v1/rooms/lab", json={"name": "Lab", "outline": outline}).raise_for_status()
+            httpx.put(f"{server.url}/v1/rooms/lab", json={"name": "Lab", "outline": outline}).raise_for_status()
             for n in range(objects):
                 tag = "E00401005CA1F00D" if n == 0 else f"E0040100000000{n:02d}"
-                httpx.put(f"{url}/v1/objects/{tag}", json={"name": tag, "room": "lab"}).raise_for_status()
-            yield url, pid
+                httpx.put(f"{server.url}/v1/objects/{tag}", json={"name": tag, "room": "lab"}).raise_for_status()
+            yield server
 
 
 @contextmanager
@@ -210,28 +232,28 @@ def free_port() -> int:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=4.0, help="length of each measurement")
+    parser.add_argument("--seconds", type=float, default=1.0, help="length of each turn")
+    parser.add_argument("--rounds", type=int, default=5, help="turns of each server")
     parser.add_argument("--postgres-url", help="maintenance database of a running PostgreSQL")
     parser.add_argument("--bare", type=int, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.bare:
         uvicorn.run(bare(), port=given.bare, log_level="warning", access_log=False)
         return
-    with serving([__file__, "--bare", "PORT"]) as (url, pid):
-        yardstick = measure("bare FastAPI", url, pid, given.seconds)
-    results = list(yardstick)
-    with postgres(given.postgres_url) as database:
+    results = []
+    with serving([__file__, "--bare", "PORT"]) as yardstick, postgres(given.postgres_url) as database:
         for name, make in (("SQLite", lambda: None), ("PostgreSQL", database)):
             for fold, objects, holdback_s in (("log", 0, 1e6), ("no objects", 0, 0.0), ("10 objects", 10, 0.0)):
-                with town(make(), objects=objects, holdback_s=holdback_s) as (url, pid):
-                    results += measure(f"{name}, {fold}", url, pid, given.seconds)
-    per_batch = {result.batch: result.us_per_observation for result in yardstick}
-    print(f"{'server':26} {'batch':>5} {'us/observation':>15} {'observations/s':>15} {'ratio':>6}")
+                with town(make(), objects=objects, holdback_s=holdback_s) as server:
+                    results += [
+                        compare(f"{name}, {fold}", server, yardstick, batch, given.seconds, given.rounds)
+                        for batch in (1, 50)
+                    ]
+    print(f"{'server':22} {'batch':>5} {'us/observation':>15} {'bare':>7} {'ratio':>6} {'observations/s':>15}")
     for result in results:
-        ratio = result.us_per_observation / per_batch[result.batch]
         print(
-            f"{result.server:26} {result.batch:5d} {result.us_per_observation:15.1f}"
-            f" {result.observations_per_s:15.0f} {ratio:6.2f}"
+            f"{result.server:22} {result.batch:5d} {result.us_per_observation:15.1f}"
+            f" {result.bare_us_per_observation:7.1f} {result.ratio:6.2f} {result.observations_per_s:15.0f}"
         )
 
 

@@ -74,7 +74,8 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
     app = FastAPI(title="Town Management System", version="1", lifespan=lifespan, docs_url=None, redoc_url=None)
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
     problems.install(app)
-    for router in (keys_router, ingest_router, objects_router, rooms_router, town_router, agents_router):
+    # Routes are tried in order: the busiest first.
+    for router in (ingest_router, keys_router, objects_router, rooms_router, town_router, agents_router):
         app.include_router(router, prefix="/v1", responses=problems.COMMON_RESPONSES)
     app.include_router(live_router, prefix="/v1")
     app.include_router(health.router)

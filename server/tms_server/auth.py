@@ -13,6 +13,7 @@ loopback, and nothing may say that a proxy stands between. Endpoints take one of
 from __future__ import annotations
 
 import ipaddress
+from functools import lru_cache
 from typing import Annotated
 from urllib.parse import urlsplit
 
@@ -162,6 +163,7 @@ def _same_origin(connection: HTTPConnection) -> bool:
     return called != "" and origin.lower() in (f"http://{called}", f"https://{called}")
 
 
+@lru_cache(maxsize=1024)
 def _hostname(url: str) -> str | None:
     try:
         return urlsplit(url).hostname
@@ -169,6 +171,7 @@ def _hostname(url: str) -> str | None:
         return None
 
 
+@lru_cache(maxsize=1024)  # every request asks it three times, of the same few
 def _is_loopback(host: str | None) -> bool:
     if host is None:
         return False

@@ -18,6 +18,9 @@ class Settings(BaseSettings):
 
     # Ingest: what is refused (429/503) instead of dropped.
     max_body_bytes: int = 4_000_000
+    linger_s: float = Field(
+        default=0.005, ge=0, le=1, description="a batch waits this long for others that become durable with it"
+    )
     queue_observations: int = Field(default=20_000, description="accepted but not yet durable, all agents together")
     queue_per_agent: int = Field(default=5_000, description="the same, one agent")
     fold_backlog: int = Field(default=100_000, description="durable but not yet folded, per room")

@@ -73,6 +73,7 @@ def upgrade() -> None:
         sa.Column("created_at", sa.BigInteger(), nullable=False),
         sa.Column("updated_at", sa.BigInteger(), nullable=False),
         sa.Column("head", sa.BigInteger(), nullable=False),
+        sa.Column("newest_at", sa.BigInteger(), nullable=True),
         sa.PrimaryKeyConstraint("room", name=op.f("pk_rooms")),
     )
     op.create_table(

@@ -13,6 +13,7 @@ from tms_client.cli import CommandError
 from tms_server.app import create_app
 from tms_server.auth import any_keys
 from tms_server.db.lock import DatabaseOwned
+from tms_server.garbage import tune_garbage_collector
 from tms_server.settings import Settings
 
 
@@ -26,8 +27,14 @@ def serve(settings: Settings) -> int:
     host, port = listener.getsockname()[:2]
     print(f"tms: http://{'[' + host + ']' if ':' in host else host}:{port}/", file=sys.stderr, flush=True)  # noqa: T201
     config = uvicorn.Config(
-        create_app(settings), log_level="warning", ws="auto", timeout_graceful_shutdown=10, proxy_headers=False
+        create_app(settings),
+        log_level="warning",
+        access_log=False,
+        ws="auto",
+        timeout_graceful_shutdown=10,
+        proxy_headers=False,
     )
+    tune_garbage_collector()
     try:
         uvicorn.Server(config).run(sockets=[listener])
     except DatabaseOwned as error:

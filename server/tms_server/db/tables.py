@@ -77,6 +77,8 @@ class RoomRow(Base):
     updated_at: Mapped[int]
     #: Newest log offset; its row lock orders the offsets of a room.
     head: Mapped[int] = mapped_column(default=0)
+    #: Newest time of observation; NULL before the first.
+    newest_at: Mapped[int | None]
 
 
 class LogRow(Base):

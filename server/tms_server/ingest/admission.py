@@ -42,32 +42,38 @@ def admit(body: bytes) -> Batch:
     if foreign:
         raise Invalid(f"{foreign[0].where}: {foreign[0].why}", items=foreign[:_MOST_PROBLEMS])
     observations = batch.observations
-    reads = [read for o in observations if o.type in _READS for read in _tag_reads(o)]
+    times = [observation.observed_at for observation in observations]
     return Batch(
         batch.agent,
         batch.room,
         observations,
         [observation.seq for observation in observations],
-        [to_us(observation.observed_at) for observation in observations],
-        reads,
+        to_us(min(times)),
+        to_us(max(times)),
+        [read for o in observations if o.type in _READS for read in _tag_reads(o)],
+        [o for o in observations if o.type == "agent_state"],
         body.decode(),
     )
 
 
 def _tag_reads(observation: Observation) -> list[TagRead]:
     """The tags it read, each once."""
-    seq, at = observation.seq, to_us(observation.observed_at)
+    found: list[tuple[str, str | None, tuple[float, float] | None]]
     match observation:
-        case LabelAppeared(tag=str(tag), label=label, xy=(x, y)):
-            return [TagRead(seq, at, tag, label, x, y)]
         case TagObserved(tag=tag, label=label):
-            return [TagRead(seq, at, tag, label, None, None)]
+            found = [(tag, label, None)]
+        case LabelAppeared(tag=str(tag), label=label, xy=xy):
+            found = [(tag, label, xy)]
         case RawRead(tag=str(tag)) | Handover(tag=str(tag)):
-            return [TagRead(seq, at, tag, None, None, None)]
+            found = [(tag, None, None)]
         case Inventory(labels=labels):
-            reads = [TagRead(seq, at, i.tag, i.label, i.xy[0], i.xy[1]) for i in labels if i.tag is not None]
-            return list({read.tag: read for read in reads}.values())
-    return []
+            found = list(
+                {item.tag: (item.tag, item.label, item.xy) for item in labels if item.tag is not None}.values()
+            )
+        case _:
+            return []
+    seq, at = observation.seq, to_us(observation.observed_at)
+    return [TagRead(seq, at, tag, label, *(xy or (None, None))) for tag, label, xy in found]
 
 
 #: Types that may read a tag; asking for the class of every observation would cost more than all the rest.

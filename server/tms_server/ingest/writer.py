@@ -61,6 +61,8 @@ class GroupWriter:
                 self._wake.clear()
                 await self._wake.wait()
                 continue
+            if not self._closing:  # what is being read just now shares the transaction
+                await asyncio.sleep(self._settings.linger_s)
             group = self._next_group()
             try:
                 await self._write(group)

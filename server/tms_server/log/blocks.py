@@ -62,61 +62,29 @@ def cut(batch: Batch, chosen: Sequence[int], after: int, received_at: int, horiz
 
     Those observed before ``horizon`` are late.
     """
+    if _is_one_run(batch, chosen, horizon):
+        body = batch.body if len(batch.body) <= _ROOMY * len(chosen) else _body(batch, batch.observations)
+        return [Written(_block(batch, batch.observations, after, received_at, False, body), batch.observations)]
     written = []
-    for some, late in _runs(batch, chosen, horizon):
-        after += len(some)
-        whole = len(some) == len(batch.observations)
-        contents = batch.observations if whole else [batch.observations[i] for i in some]
-        body = batch.body if whole and len(batch.body) <= _ROOMY * len(some) else _body(batch, contents)
-        times = batch.times if whole else [batch.times[i] for i in some]
-        seq, first_at, last_at = batch.seqs[some[0]], min(times), max(times)
-        block = Block(
-            batch.room, after, batch.agent, seq, len(some), first_at, last_at, received_at, late, body
-        )  # fmt: skip
-        written.append(Written(block, contents))
+    for said, late in _runs([batch.observations[i] for i in chosen], horizon):
+        written.append(Written(_block(batch, said, after, received_at, late, _body(batch, said)), said))
+        after += len(said)
     return written
 
 
-def records(block: Block, contents: Sequence[Content] | None = None) -> list[Record]:
-    """The records of a block, in order of offset."""
+def records(block: Block, said: Sequence[Content] | None = None) -> list[Record]:
+    """The records of a block, in order of offset; ``said``: its contents where they are known."""
     room, agent, received_at, late = block.room, block.agent, block.received_at, block.late
     found = []
-    for i, content in enumerate(contents if contents is not None else _read(block)):
+    for i, content in enumerate(said if said is not None else contents(block)):
         observed_at = getattr(content, "observed_at", None)
         at = block.first_at if observed_at is None else to_us(observed_at)
         found.append(Record(room, block.before + 1 + i, agent, block.seq + i, at, received_at, content, late))
     return found
 
 
-def _runs(batch: Batch, chosen: Sequence[int], horizon: int | None) -> list[tuple[Sequence[int], bool]]:
-    seqs, times = batch.seqs, batch.times
-    first, last = min(times), max(times)
-    n = len(chosen)
-    if (
-        n == len(seqs)
-        and last - first <= SPAN_US
-        and (horizon is None or first >= horizon)
-        and seqs == list(range(seqs[0], seqs[0] + n))
-    ):
-        return [(chosen, False)]  # nearly always
-    runs: list[tuple[list[int], bool]] = []
-    low = high = 0
-    for i in chosen:
-        late = horizon is not None and times[i] < horizon
-        low, high = min(low, times[i]), max(high, times[i])
-        if not runs or runs[-1][1] != late or seqs[i] != seqs[runs[-1][0][-1]] + 1 or high - low > SPAN_US:
-            runs.append(([], late))
-            low = high = times[i]
-        runs[-1][0].append(i)
-    return list(runs)
-
-
-def _body(batch: Batch, observations: Sequence[Any]) -> str:
-    some = ObservationBatch.model_construct(agent=batch.agent, room=batch.room, observations=list(observations))
-    return some.model_dump_json(exclude_unset=True, by_alias=True)
-
-
-def _read(block: Block) -> Sequence[Content]:
+def contents(block: Block) -> Sequence[Content]:
+    """What the records of a block say, from its body."""
     try:
         if block.agent.startswith(REGISTRY_MARK):
             body: RegistryBody = registry_body.validate_json(block.body)
@@ -126,6 +94,50 @@ def _read(block: Block) -> Sequence[Content]:
         if block.agent.startswith(REGISTRY_MARK):
             return [_unreadable(from_json(block.body), error)]
         return [_lenient(item) for item in from_json(block.body)["observations"]]
+
+
+def _is_one_run(batch: Batch, chosen: Sequence[int], horizon: int | None) -> bool:
+    """Nearly always: all of a batch, in order, on time."""
+    seqs, n = batch.seqs, len(chosen)
+    return (
+        n == len(seqs)
+        and batch.last_at - batch.first_at <= SPAN_US
+        and (horizon is None or batch.first_at >= horizon)
+        and seqs == list(range(seqs[0], seqs[0] + n))
+    )
+
+
+def _runs(observations: Sequence[Observation], horizon: int | None) -> list[tuple[list[Observation], bool]]:
+    """Cut wherever seqs jump, lateness changes, or the time would span too much."""
+    runs: list[tuple[list[Observation], bool]] = []
+    low = high = 0
+    for observation in observations:
+        at = to_us(observation.observed_at)
+        late = horizon is not None and at < horizon
+        low, high = min(low, at), max(high, at)
+        some, were_late = runs[-1] if runs else ([], late)
+        if not some or were_late != late or observation.seq != some[-1].seq + 1 or high - low > SPAN_US:
+            runs.append(([], late))
+            low = high = at
+        runs[-1][0].append(observation)
+    return runs
+
+
+def _block(batch: Batch, said: Sequence[Observation], after: int, received_at: int, late: bool, body: str) -> Block:
+    if said is batch.observations:
+        first_at, last_at = batch.first_at, batch.last_at
+    else:
+        times = [observation.observed_at for observation in said]
+        first_at, last_at = to_us(min(times)), to_us(max(times))
+    n = len(said)
+    return Block(
+        batch.room, after + n, batch.agent, said[0].seq, n, first_at, last_at, received_at, late, body
+    )  # fmt: skip
+
+
+def _body(batch: Batch, observations: Sequence[Any]) -> str:
+    some = ObservationBatch.model_construct(agent=batch.agent, room=batch.room, observations=list(observations))
+    return some.model_dump_json(exclude_unset=True, by_alias=True)
 
 
 def _lenient(item: dict[str, Any]) -> Content:

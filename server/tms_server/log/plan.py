@@ -7,16 +7,24 @@ into rows and verdicts (``Plan``), and the store writes the rows. A refused batc
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from tms_schemas.observation import AgentState, Observation
+from tms_schemas.observation import Observation
 from tms_schemas.problem import ProblemItem
+from tms_server.db.times import to_us
 from tms_server.errors import Conflict, NotFound, TmsError
 from tms_server.log.blocks import Written, cut
 from tms_server.log.bodies import Content
 from tms_server.log.record import Appended, Batch, TagRead, Verdict
+
+
+class RoomFacts(NamedTuple):
+    """Newest offset and newest time of observation (None before the first) of a room."""
+
+    head: int
+    newest_at: int | None
 
 
 class AgentFacts(NamedTuple):
@@ -51,8 +59,7 @@ class UnknownRead(NamedTuple):
 class Known:
     """What the database knew before the append."""
 
-    heads: dict[str, int]
-    newest: dict[str, int]
+    rooms: dict[str, RoomFacts]
     agents: dict[str, AgentFacts]
     #: (agent, seq) -> room and content of recorded observations that the batches name again
     stored: dict[tuple[str, int], tuple[str, Content]]
@@ -64,7 +71,7 @@ class Known:
 class Plan:
     verdicts: list[Verdict]
     blocks: list[Written] = field(default_factory=list)
-    heads: dict[str, int] = field(default_factory=dict)
+    rooms: dict[str, RoomFacts] = field(default_factory=dict)
     agents: dict[str, AgentFacts] = field(default_factory=dict)
     unknown: dict[tuple[str, str], UnknownRead] = field(default_factory=dict)
 
@@ -83,7 +90,7 @@ def decide(batches: Sequence[Batch], known: Known, *, now: int, retention_us: in
             plan.verdicts.append(refusal)
     # Every batch of a room is answered with the room's newest offset, which they all reached together.
     plan.verdicts = [
-        verdict._replace(head=known.heads[batch.room]) if isinstance(verdict, Appended) else verdict
+        verdict._replace(head=known.rooms[batch.room].head) if isinstance(verdict, Appended) else verdict
         for batch, verdict in zip(batches, plan.verdicts, strict=True)
     ]
     return plan
@@ -91,22 +98,23 @@ def decide(batches: Sequence[Batch], known: Known, *, now: int, retention_us: in
 
 def _append(batch: Batch, known: Known, plan: Plan, now: int, retention_us: int | None) -> Appended:
     room, agent = batch.room, batch.agent
-    if room not in known.heads:
+    facts = known.rooms.get(room)
+    if facts is None:
         raise NotFound(f"there is no room {room!r}", items=[ProblemItem(where="room", why="unknown room")])
     new = _new(batch, known)
     too_late: list[int] = []
     if new:
-        head, horizon = known.heads[room], _horizon(known, room, now, retention_us)
-        blocks = cut(batch, new, head, now, horizon)
+        blocks = cut(batch, new, facts.head, now, _horizon(facts, now, retention_us))
         plan.blocks += blocks
         too_late = [block.seq + i for block, _ in blocks if block.late for i in range(block.records)]
-        known.heads[room] = plan.heads[room] = head + len(new)
-        known.newest[room] = max(known.newest.get(room, blocks[0].block.last_at), *(b.block.last_at for b in blocks))
-        fresh = set() if len(new) == len(batch.seqs) else {batch.seqs[i] for i in new}
-        for read in batch.reads:
-            if (room, read.tag) not in known.registered and (not fresh or read.seq in fresh):
-                _count_unknown(plan, agent, room, read)
-    known.agents[agent] = plan.agents[agent] = _seen(known.agents.get(agent), batch, new, now)
+        newest_at = max(block.last_at for block, _ in blocks)
+        newest_at = newest_at if facts.newest_at is None else max(newest_at, facts.newest_at)
+        known.rooms[room] = plan.rooms[room] = RoomFacts(facts.head + len(new), newest_at)
+    fresh = set(batch.seqs) if len(new) == len(batch.seqs) else {batch.seqs[i] for i in new}
+    for read in batch.reads:
+        if (room, read.tag) not in known.registered and read.seq in fresh:
+            _count_unknown(plan, agent, room, read)
+    known.agents[agent] = plan.agents[agent] = _seen(known.agents.get(agent), batch, fresh, now)
     return Appended(len(new), len(batch.seqs) - len(new), 0, too_late)
 
 
@@ -139,27 +147,27 @@ def _said(content: Content) -> str:
     return content.model_dump_json(exclude_unset=True, by_alias=True)
 
 
-def _horizon(known: Known, room: str, now: int, retention_us: int | None) -> int | None:
+def _horizon(room: RoomFacts, now: int, retention_us: int | None) -> int | None:
     """Observations before it come too late. The room's own time counts, so that old data can be played again."""
-    newest = known.newest.get(room)
-    return None if retention_us is None or newest is None else min(newest, now) - retention_us
+    return None if retention_us is None or room.newest_at is None else min(room.newest_at, now) - retention_us
 
 
-def _seen(facts: AgentFacts | None, batch: Batch, new: Sequence[int], now: int) -> AgentFacts:
-    facts = facts or AgentFacts(batch.agent, batch.room, 0, 0, now, now, min(batch.times), "connected", "")
+def _seen(facts: AgentFacts | None, batch: Batch, fresh: Collection[int], now: int) -> AgentFacts:
+    """``fresh``: the numbers of what was not recorded before."""
+    facts = facts or AgentFacts(batch.agent, batch.room, 0, 0, now, now, batch.first_at, "connected", "")
     # A report of the device's state that comes after newer observations says nothing about now.
     states = [
-        (batch.times[i], batch.seqs[i], reported.state, reported.why)
-        for i in new
-        if isinstance(reported := batch.observations[i], AgentState) and batch.times[i] >= facts.last_observed_at
+        (at, reported.seq, reported.state, reported.why)
+        for reported in batch.states
+        if (at := to_us(reported.observed_at)) >= facts.last_observed_at and reported.seq in fresh
     ]
     _, _, state, why = max(states) if states else (0, 0, facts.state, facts.why)
     return facts._replace(
         room=batch.room,
         next_seq=max(facts.next_seq, max(batch.seqs) + 1),
-        received=facts.received + len(new),
+        received=facts.received + len(fresh),
         last_seen=now,
-        last_observed_at=max(facts.last_observed_at, max(batch.times)),
+        last_observed_at=max(facts.last_observed_at, batch.last_at),
         state=state,
         why=why.replace("\0", ""),
     )

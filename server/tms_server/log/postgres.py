@@ -10,7 +10,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 from tms_server.log import store
 from tms_server.log.blocks import MOST_RECORDS
 from tms_server.log.bodies import Content
-from tms_server.log.plan import AgentFacts, Known, Plan
+from tms_server.log.plan import AgentFacts, Known, Plan, RoomFacts
 from tms_server.log.record import Batch
 
 _INSERT_LOG = f"""
@@ -34,11 +34,11 @@ class PostgresStore:
         self._engine = engine
         self._connection: AsyncConnection | None = None
 
-    async def append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan], *, newest: bool) -> Plan:
+    async def append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan]) -> Plan:
         try:
             driver = await self._driver()
             async with driver.transaction(isolation="read_committed"):
-                plan = decide(await _read(driver, batches, newest))
+                plan = decide(await _read(driver, batches))
                 await _write(driver, plan)
             return plan
         except BaseException:
@@ -63,10 +63,10 @@ class PostgresStore:
             await connection.close()
 
 
-async def _read(driver: Any, batches: Sequence[Batch], newest: bool) -> Known:
+async def _read(driver: Any, batches: Sequence[Batch]) -> Known:
     wanted = store.Wanted.by(batches)
-    heads = await driver.fetch(
-        "select room, head from rooms where room = any($1) order by room for update", wanted.rooms
+    rooms = await driver.fetch(
+        f"select {store.ROOM_COLUMNS} from rooms where room = any($1) order by room for update", wanted.rooms
     )
     facts = await driver.fetch(f"select {store.AGENT_COLUMNS} from agents where agent = any($1)", wanted.agents)
     agents = {row[0]: AgentFacts(*row) for row in facts}
@@ -79,21 +79,19 @@ async def _read(driver: Any, batches: Sequence[Batch], newest: bool) -> Known:
         stored |= store.contents(await driver.fetch(select, agent, low - MOST_RECORDS + 1, high, low))
     select = "select room, tag from objects where tag = any($1)"
     registered = await driver.fetch(select, wanted.tags) if wanted.tags else []
-    known = Known(dict(heads), {}, agents, stored, {(room, tag) for room, tag in registered})
-    if newest:
-        found = {room: await driver.fetchval(store.NEWEST.format("$1"), room) for room in wanted.rooms}
-        known.newest = {room: at for room, at in found.items() if at is not None}
-    return known
+    known = {room: RoomFacts(*facts) for room, *facts in rooms}
+    return Known(known, agents, stored, {(room, tag) for room, tag in registered})
 
 
 async def _write(driver: Any, plan: Plan) -> None:
     if plan.blocks:
         await driver.execute(_INSERT_LOG, *_columns(block for block, _ in plan.blocks))
         await driver.execute(
-            "update rooms set head = new.head from unnest($1::text[], $2::bigint[]) as new (room, head)"
+            "update rooms set head = new.head, newest_at = new.newest_at"
+            " from unnest($1::text[], $2::bigint[], $3::bigint[]) as new (room, head, newest_at)"
             " where rooms.room = new.room",
-            list(plan.heads),
-            list(plan.heads.values()),
+            list(plan.rooms),
+            *_columns(plan.rooms.values()),
         )
     if plan.agents:
         await driver.execute(_INSERT_AGENTS, *_columns(plan.agents.values()))

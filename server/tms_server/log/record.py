@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from tms_schemas.observation import Observation
+from tms_schemas.observation import AgentState, Observation
 from tms_server.errors import TmsError
 from tms_server.log.bodies import Content
 
@@ -66,16 +66,19 @@ class TagRead(NamedTuple):
 class Batch(NamedTuple):
     """Observations of one agent in one room; recorded whole or not at all.
 
-    ``seqs`` and ``times`` (microseconds UTC) are theirs, in the same order; ``reads`` all tags they read.
-    ``body``: an ``ObservationBatch`` as JSON, with exactly these observations.
+    ``seqs`` are theirs, in the same order; ``first_at`` and ``last_at`` their smallest and largest time (microseconds
+    UTC); ``reads`` all tags they read; ``states`` those that report a device's state. ``body``: an
+    ``ObservationBatch`` as JSON, with exactly these observations.
     """
 
     agent: str
     room: str
     observations: Sequence[Observation]
     seqs: list[int]
-    times: list[int]
+    first_at: int
+    last_at: int
     reads: list[TagRead]
+    states: list[AgentState]
     body: str
 
 

@@ -14,7 +14,6 @@ from tms_server.db.session import CHANGED_ROOMS
 from tms_server.db.tables import LogRow, RoomRow, UnknownTagRow
 from tms_server.db.times import to_us
 from tms_server.errors import NotFound
-from tms_server.log.blocks import SPAN_US
 from tms_server.log.bodies import ObjectRegistered, ObjectRemoved, RegistryBody
 from tms_server.log.record import REGISTRY_MARK
 
@@ -30,15 +29,21 @@ async def append_registry(session: AsyncSession, room: str, body: RegistryBody, 
         NotFound: there is no such room.
     """
     await session.flush()
-    head = await session.scalar(
-        update(RoomRow).where(RoomRow.room == room).values(head=RoomRow.head + 1).returning(RoomRow.head),
+    updated = await session.execute(
+        update(RoomRow)
+        .where(RoomRow.room == room)
+        .values(head=RoomRow.head + 1)
+        .returning(RoomRow.head, RoomRow.newest_at),
         execution_options={"synchronize_session": False},
     )
-    if head is None:
+    facts = updated.first()
+    if facts is None:
         raise NotFound(f"there is no room {room!r}")
+    head, newest_at = facts
     agent = REGISTRY_MARK + room
     seq = await session.scalar(select(func.coalesce(func.max(LogRow.seq), 0) + 1).where(LogRow.agent == agent))
-    effective_at = await _newest(session, room, to_us(now))
+    # From the room's newest observation on, but never from the future; from the beginning in an empty room.
+    effective_at = 0 if newest_at is None else min(newest_at, to_us(now))
     if isinstance(body, ObjectRegistered):
         this = (UnknownTagRow.room == room) & (UnknownTagRow.tag == body.tag)
         first_seen = await session.scalar(select(UnknownTagRow.first_seen).where(this))
@@ -61,13 +66,6 @@ async def append_registry(session: AsyncSession, room: str, body: RegistryBody, 
         )
     )
     session.info.setdefault(CHANGED_ROOMS, set()).add(room)
-
-
-async def _newest(session: AsyncSession, room: str, now: int) -> int:
-    """From when a change counts: the room's newest observation, but never the future; 0 in an empty room."""
-    start = select(func.max(LogRow.first_at)).where(LogRow.room == room).scalar_subquery() - SPAN_US
-    newest = await session.scalar(select(func.max(LogRow.last_at)).where(LogRow.room == room, LogRow.first_at >= start))
-    return 0 if newest is None else min(newest, now)
 
 
 async def _removed(session: AsyncSession, agent: str, tag: str) -> int:

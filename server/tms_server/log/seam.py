@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Sequence
 from typing import NamedTuple, Protocol
 
+from tms_server.log.blocks import Written
 from tms_server.log.record import Batch, Position, Record, Verdict
 
 
@@ -18,8 +19,8 @@ class RoomLog(Protocol):
             Unavailable: the storage failed and nothing is acknowledged. The same batches may be sent again.
         """
 
-    def follow(self, room: str, after: int) -> AsyncIterator[list[Record]]:
-        """Records with a larger offset than ``after``, in pages, as they are committed. Never ends."""
+    def follow(self, room: str, after: int) -> AsyncIterator[list[Written]]:
+        """Blocks that end after the offset ``after``, in pages, as they are committed. Never ends."""
 
     async def read(self, room: str, after: int, limit: int) -> list[Record]:
         """The next records after an offset, in order of offset: ``limit``, or a few more; fewer only at the end."""

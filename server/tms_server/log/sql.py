@@ -17,7 +17,7 @@ from tms_server.db.engine import is_sqlite
 from tms_server.db.tables import LogRow, RoomRow
 from tms_server.db.times import to_us
 from tms_server.errors import Unavailable
-from tms_server.log.blocks import MOST_RECORDS, SPAN_US, Block, records
+from tms_server.log.blocks import MOST_RECORDS, SPAN_US, Block, Written, contents, records
 from tms_server.log.merging import Merge, start
 from tms_server.log.plan import decide
 from tms_server.log.postgres import PostgresStore
@@ -64,26 +64,26 @@ class SqlRoomLog:
     async def append(self, batches: Sequence[Batch]) -> list[Verdict]:
         choose = partial(decide, batches, now=to_us(self._clock.now()), retention_us=self._retention_us)
         try:
-            plan = await self._store.append(batches, choose, newest=self._retention_us is not None)
+            plan = await self._store.append(batches, choose)
         except Exception as error:
             raise Unavailable(f"the log cannot be written: {type(error).__name__}", retry_after_s=2) from error
-        self._committed.update(plan.heads)
         self._tail.add(plan.blocks)
-        for room in plan.heads:
+        for room, facts in plan.rooms.items():
+            self._committed[room] = facts.head
             self._wake(room)
         return plan.verdicts
 
-    async def follow(self, room: str, after: int) -> AsyncIterator[list[Record]]:
+    async def follow(self, room: str, after: int) -> AsyncIterator[list[Written]]:
         looked: int | None = None
         while True:
             # Both are taken before looking: what comes meanwhile is news.
             news, outside = self._news[room], self._outside[room]
             page = self._tail.after(room, after, PAGE)
             if not page and (looked != outside or self._committed.get(room, 0) > after):
-                page = await self.read(room, after, PAGE)
+                page = await self._written(room, after, PAGE)
                 looked = None if page else outside
             if page:
-                after = page[-1].offset
+                after = page[-1].block.offset
                 yield page
                 continue
             try:
@@ -93,6 +93,10 @@ class SqlRoomLog:
                 looked = None
 
     async def read(self, room: str, after: int, limit: int) -> list[Record]:
+        found = [record for written in await self._written(room, after, limit) for record in records(*written)]
+        return [record for record in found if record.offset > after]
+
+    async def _written(self, room: str, after: int, limit: int) -> list[Written]:
         query = (
             select(*_COLUMNS)
             .where(LogRow.room == room, LogRow.offset > after, LogRow.offset <= after + limit + MOST_RECORDS)
@@ -100,8 +104,7 @@ class SqlRoomLog:
             .order_by(LogRow.offset)
         )
         blocks = await self._blocks(query)
-        found = await asyncio.to_thread(lambda: [record for block in blocks for record in records(block)])
-        return [record for record in found if record.offset > after]
+        return await asyncio.to_thread(lambda: [Written(block, contents(block)) for block in blocks])
 
     async def replay(
         self, room: str, *, after: Position, until: Position | None, head: int

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from tms_server.log import store
 from tms_server.log.blocks import MOST_RECORDS
 from tms_server.log.bodies import Content
-from tms_server.log.plan import AgentFacts, Known, Plan
+from tms_server.log.plan import AgentFacts, Known, Plan, RoomFacts
 from tms_server.log.record import Batch
 
 #: Seconds that an append waits for the write lock of another connection.
@@ -26,19 +26,19 @@ class SqliteStore:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="log-append")
         self._connection: sqlite3.Connection | None = None
 
-    async def append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan], *, newest: bool) -> Plan:
+    async def append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan]) -> Plan:
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, self._append, batches, decide, newest)
+        return await loop.run_in_executor(self._thread, self._append, batches, decide)
 
     async def close(self) -> None:
         await asyncio.get_running_loop().run_in_executor(self._thread, self._disconnect)
         self._thread.shutdown()
 
-    def _append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan], newest: bool) -> Plan:
+    def _append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan]) -> Plan:
         connection = self._connection = self._connection or self._connect()
         try:
             connection.execute("begin immediate")
-            plan = decide(_read(connection, batches, newest))
+            plan = decide(_read(connection, batches))
             _write(connection, plan)
             connection.execute("commit")
             return plan
@@ -60,13 +60,15 @@ class SqliteStore:
             connection.close()
 
 
-def _read(connection: sqlite3.Connection, batches: Sequence[Batch], newest: bool) -> Known:
+def _read(connection: sqlite3.Connection, batches: Sequence[Batch]) -> Known:
     wanted = store.Wanted.by(batches)
 
     def rows(select: str, *values: object) -> list[tuple[object, ...]]:
         return connection.execute(select, values).fetchall()
 
-    heads = rows("select room, head from rooms where room in (select value from json_each(?))", _list(wanted.rooms))
+    rooms = rows(
+        f"select {store.ROOM_COLUMNS} from rooms where room in (select value from json_each(?))", _list(wanted.rooms)
+    )
     facts = rows(
         f"select {store.AGENT_COLUMNS} from agents where agent in (select value from json_each(?))",
         _list(wanted.agents),
@@ -79,11 +81,8 @@ def _read(connection: sqlite3.Connection, batches: Sequence[Batch], newest: bool
         stored |= store.contents(rows(select, agent, low - MOST_RECORDS + 1, high, low))
     select = "select room, tag from objects where tag in (select value from json_each(?))"
     registered = rows(select, _list(wanted.tags)) if wanted.tags else []
-    known = Known(dict(heads), {}, agents, stored, set(registered))  # type: ignore[arg-type]
-    if newest:
-        found = {room: rows(store.NEWEST.format("?1"), room)[0][0] for room in wanted.rooms}
-        known.newest = {room: at for room, at in found.items() if isinstance(at, int)}
-    return known
+    known = {str(room): RoomFacts(*facts) for room, *facts in rooms}  # type: ignore[arg-type]
+    return Known(known, agents, stored, set(registered))  # type: ignore[arg-type]
 
 
 def _write(connection: sqlite3.Connection, plan: Plan) -> None:
@@ -92,7 +91,10 @@ def _write(connection: sqlite3.Connection, plan: Plan) -> None:
         f"insert into log ({store.LOG_COLUMNS}) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         [block for block, _ in plan.blocks],
     )
-    many("update rooms set head = ? where room = ?", [(head, room) for room, head in plan.heads.items()])
+    many(
+        "update rooms set head = ?, newest_at = ? where room = ?",
+        [(*facts, room) for room, facts in plan.rooms.items()],
+    )
     many(
         f"insert into agents ({store.AGENT_COLUMNS}) values (?, ?, ?, ?, ?, ?, ?, ?, ?) {store.ON_AGENT_CONFLICT}",
         list(plan.agents.values()),

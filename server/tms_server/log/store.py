@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple, Protocol, Self
 
-from tms_server.log.blocks import SPAN_US, Block, records
+from tms_server.log.blocks import Block, records
 from tms_server.log.bodies import Content
 from tms_server.log.plan import Known, Plan
 from tms_server.log.record import Batch
 
 
 class Store(Protocol):
-    async def append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan], *, newest: bool) -> Plan:
+    async def append(self, batches: Sequence[Batch], decide: Callable[[Known], Plan]) -> Plan:
         """Read what ``decide`` needs, write what it decided, commit durably.
 
-        ``newest``: also read the newest time of observation of each room. Raises the driver's errors; the next call
-        starts afresh.
+        Raises the driver's errors; the next call starts afresh.
         """
 
     async def close(self) -> None: ...
@@ -61,10 +60,7 @@ def contents(rows: Iterable[Sequence[Any]]) -> dict[tuple[str, int], tuple[str, 
 
 
 LOG_COLUMNS = 'room, "offset", agent, seq, records, first_at, last_at, received_at, late, body'
-#: The newest time of observation in the room ``{0}``. No block that starts earlier than this can reach farther.
-NEWEST = f"""
-select max(last_at) from log where room = {{0}}
-    and first_at >= (select max(first_at) from log where room = {{0}}) - {SPAN_US}"""
+ROOM_COLUMNS = "room, head, newest_at"
 AGENT_COLUMNS = "agent, room, next_seq, received, first_seen, last_seen, last_observed_at, state, why"
 UNKNOWN_COLUMNS = "tag, room, agent, first_seen, last_seen, count, label, x, y"
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from tms_server.log.blocks import Written, records
-from tms_server.log.record import Record
+from tms_server.log.blocks import Written
 
 #: Records kept per room, at least.
 _KEPT = 4000
@@ -28,17 +27,17 @@ class Tail:
             while written.block.offset - kept[0].block.offset >= _KEPT:
                 kept.popleft()
 
-    def after(self, room: str, offset: int, limit: int) -> list[Record]:
-        """The records that follow ``offset``, ``limit`` or a few more; nothing where the next one is not here."""
+    def after(self, room: str, offset: int, limit: int) -> list[Written]:
+        """Blocks that end after ``offset``, of ``limit`` records or a few more; nothing where the first is not here."""
         kept = self._blocks.get(room)
         if not kept or not kept[0].block.before <= offset < kept[-1].block.offset:
             return []
-        wanted: list[Written] = []
+        page: list[Written] = []
         for written in reversed(kept):
             if written.block.offset <= offset:
                 break
-            wanted.append(written)
-        page: list[Record] = []
-        while wanted and len(page) < limit:
-            page += records(*wanted.pop())
-        return [record for record in page if record.offset > offset] if page[0].offset <= offset else page
+            page.append(written)
+        page.reverse()
+        while len(page) > 1 and page[-1].block.before >= offset + limit:
+            page.pop()
+        return page

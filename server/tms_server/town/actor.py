@@ -10,17 +10,18 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator
 from datetime import datetime, timedelta
-from heapq import heappop, heappush
 from typing import NamedTuple
 
 from tms_server.clock import Clock
 from tms_server.db.times import to_us
 from tms_server.errors import Unavailable
+from tms_server.log.blocks import Written
 from tms_server.log.record import Position, Record
 from tms_server.log.seam import RoomLog, Snapshot, Snapshots
 from tms_server.settings import Settings
 from tms_server.town.checkpoints import Checkpoints
 from tms_server.town.fold import RoomFold
+from tms_server.town.holdback import HoldBack
 
 _log = logging.getLogger(__name__)
 #: Seconds that a query waits for the fold to catch up before it is told to come back.
@@ -47,9 +48,8 @@ class RoomActor:
         self._budget = None if settings.filter == "exact" else settings.budget
         self._fold = RoomFold(self._budget)
         self._past = Checkpoints(self._fold)
-        #: Taken in but not folded, in fold order.
-        #: Records that wait for the hold-back, a heap.
-        self._held: list[tuple[Position, Record]] = []
+        #: Taken in but not folded.
+        self._held = HoldBack()
         self._folding = asyncio.Lock()
         self._news = asyncio.Event()
         self._since_snapshot = 0
@@ -117,17 +117,17 @@ class RoomActor:
             past = Checkpoints(fold)
             self._since_snapshot = 0
             horizon = self._horizon()
-            held: list[tuple[Position, Record]] = []
+            held: list[Record] = []
             async for page in self._log.replay(self.room, after=fold.position, until=None, head=head):
                 due = [record for record in page if record.observed_at <= horizon]
-                held.extend((record.position, record) for record in page[len(due) :])  # in order: a heap
+                held += page[len(due) :]
                 await asyncio.to_thread(_fold_all, fold, past, due)
                 self._since_snapshot += len(due)
-            self._fold, self._past, self._held, self.head = fold, past, held, head
+            self._fold, self._past, self._held, self.head = fold, past, HoldBack(held), head
             self._publish()
 
-    async def _pages(self) -> AsyncIterator[list[Record]]:
-        """New records as they come; an empty page where held ones fell due meanwhile."""
+    async def _pages(self) -> AsyncIterator[list[Written]]:
+        """New blocks as they come; an empty page where held ones fell due meanwhile."""
         if not self._settings.holdback_s:
             async for page in self._log.follow(self.room, self.head):
                 yield page
@@ -143,15 +143,10 @@ class RoomActor:
         finally:
             following.cancel()
 
-    async def _take(self, page: list[Record]) -> None:
-        held, horizon = self._held, self._horizon()
-        for record in page:
-            if not record.late:
-                heappush(held, (record.position, record))
-        due: list[Record] = []
-        while held and held[0][0].observed_at <= horizon:
-            due.append(heappop(held)[1])
-        head = page[-1].offset if page else self.head
+    async def _take(self, page: list[Written]) -> None:
+        self._held.add(page)
+        due = self._held.due(self._horizon())
+        head = page[-1].block.offset if page else self.head
         if not due and head == self.head:
             return
         async with self._folding:

@@ -38,7 +38,7 @@ class SlowLog:
 
 
 def batch(agent: str, size: int) -> Batch:
-    return Batch(agent, "lab", [STATE] * size, list(range(size)), [0] * size, [], "{}")
+    return Batch(agent, "lab", [STATE] * size, list(range(size)), 0, 0, [], [], "{}")
 
 
 @pytest.fixture
