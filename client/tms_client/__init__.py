@@ -30,12 +30,14 @@ from tms_client.errors import (
 )
 from tms_client.flows import Retry
 from tms_client.grasping import Gripper
+from tms_client.hands import AsyncHand, Hand
 from tms_client.posting import AsyncPoster, Poster
 from tms_client.spool import DeadLetter, Spool
 from tms_client.town import Town
 
 __all__ = [
     "Ambiguous",
+    "AsyncHand",
     "AsyncPoster",
     "AsyncTown",
     "BadAnswer",
@@ -45,6 +47,7 @@ __all__ = [
     "DeadLetter",
     "Forbidden",
     "Gripper",
+    "Hand",
     "Invalid",
     "Location",
     "NotFound",

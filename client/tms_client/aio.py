@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import ssl
+import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
 from datetime import datetime
+from pathlib import Path
 from typing import Any, TypeVar
 
 import httpx
@@ -19,7 +21,10 @@ from tms_client.answers import Location
 from tms_client.api import Api, Area
 from tms_client.connection import AsyncConnection, client_options
 from tms_client.delivery import Pace
-from tms_client.flows import Flow, Retry
+from tms_client.errors import NotFound, SpoolError, TownError
+from tms_client.flows import NO_RETRY, Flow, Retry
+from tms_client.grasping import Onto
+from tms_client.hands import AsyncHand, AsyncRunning, Hands, only_one, place
 from tms_client.live import Endpoint, LiveFrame, follow_async, subscription
 from tms_client.posting import AsyncPoster
 from tms_client.spool import Spool
@@ -67,8 +72,15 @@ class AsyncTown:
         self.products = Products(self._connection, self._api)
         self.rooms = Rooms(self._connection, self._api)
         self.agents = Agents(self._connection, self._api)
+        self._agents: dict[str, AsyncRunning] = {}
+        self._opening = asyncio.Lock()
 
     async def aclose(self) -> None:
+        """Ends the hands that are open, then the connection."""
+        async with self._opening:
+            for running in self._agents.values():
+                await running.aclose()
+            self._agents.clear()
         await self._http.aclose()
 
     async def __aenter__(self) -> AsyncTown:
@@ -128,6 +140,59 @@ class AsyncTown:
         """A poster that sends what the spool holds, through this connection."""
         return AsyncPoster(self._http, spool, room, pace=pace, retry=retry)
 
+    async def hand(
+        self,
+        agent: str,
+        *,
+        room: str,
+        spool: Spool | Path | str,
+        name: str = "hand",
+        heartbeat_s: float = 10.0,
+        clock: Callable[[], float] = time.time,
+    ) -> AsyncHand:
+        """A hand of a robot that knows itself what it grasps; it works on while the server is away.
+
+        Hands of the same agent (two arms) share its spool: a file that the agent owns. Open until the town is closed.
+
+        Raises:
+            NotFound: there is no such room.
+            SpoolError: the spool belongs to another agent, or is open elsewhere.
+        """
+        async with self._opening:
+            running = self._agents.get(agent)
+            if running is None:
+                running = self._agents[agent] = await self._open(agent, room, spool, heartbeat_s, clock)
+            elif running.hands.room != room:
+                raise TownError(f"agent {agent} works in room {running.hands.room!r}, not in {room!r}")
+            running.names.add(name)
+        return AsyncHand(running.hands, running.poster, name)
+
+    async def grasped(
+        self,
+        tag: str | None,
+        at: tuple[float, float] | tuple[float, float, float],
+        *,
+        hand: str = "hand",
+        weight_g: float | None = None,
+        when: datetime | None = None,
+    ) -> None:
+        """Short for the ``grasped`` of the hand opened under this name; ``at`` is (x, y) or (x, y, z), metres."""
+        xy, z = place(at)
+        await self._hand(hand).grasped(tag, xy, z=z, weight_g=weight_g, when=when)
+
+    async def released(
+        self,
+        at: tuple[float, float] | tuple[float, float, float],
+        *,
+        surface: str | None = None,
+        kind: Onto = "table",
+        hand: str = "hand",
+        when: datetime | None = None,
+    ) -> None:
+        """Short for the ``released`` of the hand opened under this name; ``at`` is (x, y) or (x, y, z), metres."""
+        xy, z = place(at)
+        await self._hand(hand).released(xy, surface=surface, kind=kind, z=z, when=when)
+
     def live(
         self,
         room: str,
@@ -149,6 +214,35 @@ class AsyncTown:
             cursor=cursor,
         )
         return follow_async(self._endpoint, wanted)
+
+    async def _open(
+        self, agent: str, room: str, spool: Spool | Path | str, heartbeat_s: float, clock: Callable[[], float]
+    ) -> AsyncRunning:
+        plan: Room | None
+        try:
+            plan = await self._run(Api(NO_RETRY).room(room))
+        except NotFound:
+            raise
+        except TownError:  # no server now, or no right to look: what the spool remembers of the room will do
+            plan = None
+        own = None if isinstance(spool, Spool) else await asyncio.to_thread(Spool, spool, agent, clock=clock)
+        used = own if own is not None else spool
+        assert isinstance(used, Spool)
+        try:
+            if used.agent != agent:
+                raise SpoolError(f"the spool is that of agent {used.agent!r}, not {agent!r}")
+            hands = await asyncio.to_thread(Hands, used, room, plan, clock=clock)
+        except BaseException:
+            if own is not None:
+                own.close()
+            raise
+        running = AsyncRunning(hands, self.poster(used, room), own_spool=own is not None, heartbeat_s=heartbeat_s)
+        await running.start()
+        return running
+
+    def _hand(self, name: str) -> AsyncHand:
+        running = only_one(self._agents, name)
+        return AsyncHand(running.hands, running.poster, name)
 
     async def _run(self, flow: Flow[T]) -> T:
         return await self._connection.run(flow)

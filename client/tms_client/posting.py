@@ -46,6 +46,10 @@ class Poster:
         self.spool.put(self.room, *observations)
         self._wake.set()
 
+    def wake(self) -> None:
+        """Something was put into the spool: send it now."""
+        self._wake.set()
+
     def drain(self, timeout_s: float = 30.0) -> bool:
         """Send until nothing waits; False where that took too long."""
         deadline = time.monotonic() + timeout_s
@@ -112,6 +116,10 @@ class AsyncPoster:
         """
         async with self._in_order:
             await asyncio.to_thread(self.spool.put, self.room, *observations)
+        self._wake.set()
+
+    def wake(self) -> None:
+        """Something was put into the spool: send it now."""
         self._wake.set()
 
     async def drain(self, timeout_s: float = 30.0) -> bool:

@@ -12,7 +12,7 @@ import itertools
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -75,8 +75,10 @@ class Spool:
 
     # filling
 
-    def put(self, room: str, *observations: Observation) -> None:
+    def put(self, room: str, *observations: Observation, keep: Mapping[str, str] | None = None) -> None:
         """Store observations durably, all or none. Their ``seq`` is replaced by the agent's running number.
+
+        ``keep`` are notes of the agent to itself (see ``kept``), written together with what they belong to.
 
         Raises:
             SpoolFull: there is no place; the refusal is counted in ``refused``.
@@ -97,6 +99,7 @@ class Spool:
                 self._db.executemany("INSERT INTO item (seq, room, body) VALUES (?, ?, ?)", rows)
                 if first is not None:
                     self._set("next_seq", first + len(bodies))
+                self._db.executemany("INSERT OR REPLACE INTO note (name, text) VALUES (?, ?)", (keep or {}).items())
             self.pending += len(bodies)
             self.pending_bytes += size
 
@@ -108,6 +111,12 @@ class Spool:
                 n = int(self._clock() * 1000)
             self._set("next_label", n + 1)
         return f"{self.agent}/{n}"
+
+    def kept(self, name: str) -> str | None:
+        """The last note of that name; a restarted agent goes on from it. None where there is none."""
+        with self._lock:
+            row = self._db.execute("SELECT text FROM note WHERE name = ?", (name,)).fetchone()
+        return None if row is None else str(row[0])
 
     # emptying
 
@@ -244,6 +253,7 @@ class Spool:
 _TABLES = (
     "CREATE TABLE IF NOT EXISTS owner (agent TEXT NOT NULL)",
     "CREATE TABLE IF NOT EXISTS number (name TEXT PRIMARY KEY, value INTEGER NOT NULL) WITHOUT ROWID",
+    "CREATE TABLE IF NOT EXISTS note (name TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID",
     "CREATE TABLE IF NOT EXISTS item (n INTEGER PRIMARY KEY AUTOINCREMENT, seq INTEGER UNIQUE, room TEXT NOT NULL,"
     " body TEXT NOT NULL)",
     "CREATE TABLE IF NOT EXISTS dead (n INTEGER PRIMARY KEY AUTOINCREMENT, seq INTEGER NOT NULL, room TEXT NOT NULL,"
