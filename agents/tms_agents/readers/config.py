@@ -20,6 +20,8 @@ class LlrpSource(Section):
     #: Antennas to read with; [0] means all.
     antennas: Annotated[list[Annotated[int, Field(ge=0, le=65535)]], Field(min_length=1, max_length=64)] = [0]
     keepalive_s: Seconds = 3.0
+    #: Antennas take turns of this length, and the end of each is told; without it they read together, without rounds.
+    round_s: Seconds | None = None
     #: Take the times of the reader's own clock instead of this computer's.
     reader_clock: bool = False
 
@@ -29,6 +31,9 @@ class _Tr3(Section):
     #: ``inventory`` polls; ``rdloop`` listens to a reader that was set to report by itself.
     mode: Literal["inventory", "rdloop"] = "inventory"
     poll_s: Seconds = 0.2
+    #: Radiate only while reading; ``rest_antenna`` is one with nothing connected, selected meanwhile.
+    rf_off_between_rounds: bool = False
+    rest_antenna: Annotated[int, Field(ge=0, le=254)] | None = None
 
 
 class Tr3SerialSource(_Tr3):

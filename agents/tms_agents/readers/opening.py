@@ -75,7 +75,7 @@ def _link(
     if isinstance(source, LlrpSource):
         return Link(
             tcp(source.host, source.port),
-            lambda: LlrpSession(antennas=source.antennas, keepalive_s=source.keepalive_s),
+            lambda: LlrpSession(antennas=source.antennas, keepalive_s=source.keepalive_s, round_s=source.round_s),
             name=f"LLRP reader {source.host}:{source.port}",
             silent_after_s=max(silent_after_s, 2.5 * source.keepalive_s),
         )
@@ -96,7 +96,14 @@ def _link(
         opener, name = tcp(source.host, source.port), f"TR3 {source.host}:{source.port}"
     return Link(
         opener,
-        lambda: Tr3Session(antennas=source.antennas, mode=source.mode, poll_s=source.poll_s, field=field),
+        lambda: Tr3Session(
+            antennas=source.antennas,
+            mode=source.mode,
+            poll_s=source.poll_s,
+            rf_off_between_rounds=source.rf_off_between_rounds,
+            rest_antenna=source.rest_antenna,
+            field=field,
+        ),
         name=name,
         silent_after_s=silent_after_s,
         tick_s=min(0.05, source.poll_s / 2),
