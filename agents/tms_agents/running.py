@@ -90,6 +90,11 @@ class Running:
         """A label id that the agent never used."""
         return self._poster.spool.new_label()
 
+    @property
+    def waiting(self) -> int:
+        """Observations that the server has not acknowledged."""
+        return len(self._poster.spool)
+
     async def observations(self, *observations: Observation) -> bool:
         """Into the spool, all or none. A full spool is said once, what it refuses is counted as lost (False)."""
         if not observations:

@@ -26,7 +26,7 @@ P = TypeVar("P", bound=Posted)
 def main(argv: Sequence[str]) -> int:
     parser = ArgumentParser(prog="tms agent", description="Run one agent beside its sensor.")
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
-    hand = _kind(kinds, "hand", "tag reader of a robot's hand: LLRP, Takaya TR3, or a recording", _hand)
+    hand = _kind(kinds, "hand", "a robot's hands, or a tag reader: LLRP, Takaya TR3, ThingMagic, a recording", _hand)
     hand.add_argument("--once", action="store_true", help="with a capture: end when all of it has reached the server")
     hand.add_argument(
         "--timeout", type=float, default=60.0, metavar="S", help="with --once: wait this long for the server"

@@ -15,6 +15,8 @@ log = logging.getLogger(__name__)
 
 #: A gripper whose place on the robot nobody tells is within an arm's length of the base: standard deviation, m.
 _REACH_SD_M = 0.4
+#: Nothing in a room is farther away: a joint state or a mimic factor that is nonsense.
+_MOST_M = 1e5
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -80,8 +82,12 @@ class Posture:
                 float(jx @ jy) * joint,
                 float(jy @ jy) * joint + variance,
             )
+        spot = self._in_room(xyz, own)
+        if not all(abs(one) < _MOST_M for one in (*spot.xy, spot.z or 0.0, *(spot.cov or ()))):  # NaN too
+            self._say_once(hand, f"its joints put it at {spot.xy}")
+            return None
         self._said.discard(hand)
-        return self._in_room(xyz, own)
+        return spot
 
     def _in_room(self, xyz: tuple[float, float, float | None], own: tuple[float, float, float]) -> Spot:
         """``own``: covariance (xx, xy, yy) of the gripper's place on the robot, in the frame of the robot."""

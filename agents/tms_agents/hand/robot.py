@@ -33,6 +33,8 @@ from tms_schemas.observation import (
 #: Two hands nearer than this may hold the same thing; further apart than the second they hold two.
 _TOGETHER_M, _APART_M = 0.3, 0.6
 _MAX_TAG = 64
+#: Readers and robot deliver out of order by less than this; more is a clock that was set.
+_CLOCK_STEP_S = 2.0
 #: The body is told again after moving or turning this much, and not sooner than this.
 _BODY_M, _BODY_RAD, _BODY_S = 0.1, 0.2, 0.5
 
@@ -73,6 +75,8 @@ class Robot:
             name: _Hand(Grasp(settings), Gripper(new_label, step_m=0.0, table=table))
             for name, settings in hands.items()
         }
+        self._newest = float("-inf")
+        self._set_back = 0.0  # seconds by which the clock was set back since the start
         self._body: str | None = None
         self._body_told: tuple[datetime, tuple[float, float, float]] | None = None
 
@@ -88,7 +92,7 @@ class Robot:
             if hand.said is not None:
                 spot = self._posture.spot(name, hand.said)
                 before = hand.grasp.phase
-                events = hand.grasp.grip(at.timestamp(), _grip(hand.said), spot)
+                events = hand.grasp.grip(self._seconds(at), _grip(hand.said), spot)
                 if hand.grasp.phase == "holding" and before in ("closed", "empty"):
                     hand.shares = self._giver(name)
                 found += self._tell(name, at, events)
@@ -98,15 +102,15 @@ class Robot:
         """The reader at a hand reads a tag; one too long for the wire is none."""
         if len(tag) > _MAX_TAG:
             return []
-        return self._tell(hand, at, self._hands[hand].grasp.read(at.timestamp(), tag))
+        return self._tell(hand, at, self._hands[hand].grasp.read(self._seconds(at), tag))
 
     def round_end(self, hand: str, at: datetime) -> list[Observation]:
         """The reader at a hand has been asked for all its tags."""
-        return self._tell(hand, at, self._hands[hand].grasp.round_end(at.timestamp()))
+        return self._tell(hand, at, self._hands[hand].grasp.round_end(self._seconds(at)))
 
     def reader(self, hand: str, at: datetime, alive: bool) -> None:
         """The reader at a hand delivers, or not."""
-        self._hands[hand].grasp.reader(at.timestamp(), alive)
+        self._hands[hand].grasp.reader(self._seconds(at), alive)
 
     def interrupted(self) -> None:
         """The robot tells nothing at present."""
@@ -159,6 +163,15 @@ class Robot:
         except (KeyError, TypeError, AttributeError) as error:
             raise ValueError(f"not the state of a robot's hands: {error!r}") from error
 
+    def _seconds(self, at: datetime) -> float:
+        """Time as the hands know it: it goes on where the clock is set back."""
+        seconds = at.timestamp() + self._set_back
+        if seconds < self._newest - _CLOCK_STEP_S:
+            self._set_back += self._newest - seconds
+            seconds = self._newest
+        self._newest = max(self._newest, seconds)
+        return seconds
+
     # what is told
 
     def _tell(self, name: str, at: datetime, events: list[GraspEvent]) -> list[Observation]:
@@ -166,7 +179,7 @@ class Robot:
 
     def _one(self, name: str, at: datetime, event: GraspEvent) -> list[Observation]:
         hand = self._hands[name]
-        gripper, when = hand.gripper, datetime.fromtimestamp(event.at, at.tzinfo)
+        gripper, when = hand.gripper, datetime.fromtimestamp(event.at - self._set_back, at.tzinfo)
         before: list[Observation] = []
         if hand.shares is not None:
             if not self._splits(hand, event):
@@ -235,7 +248,7 @@ class Robot:
         xy, z, cov = (held.xy, held.z, None) if spot is None else (spot.xy, spot.z, spot.cov)
         new = held.model_copy(update={"label": self._new_label(), "xy": xy, "z": z})
         taker.gripper.held = new
-        taker.grasp.adopt(at.timestamp(), new.tag)
+        taker.grasp.adopt(self._seconds(at), new.tag)
         place = Placed(xy=xy, z=z, cov=cov).model_dump(exclude_none=True)
         return [Transfer(seq=0, observed_at=at, from_=held.label, to=new.label, kind="robot", **place)]
 

@@ -13,7 +13,6 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tms_agents.devices.transport import DeviceFault
-from tms_schemas.base import Pose
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +44,7 @@ class StateMessage(_Message):
 
     t: Annotated[float, Field(ge=0, le=1e11)] | None = None
     joints: Annotated[dict[str, Small], Field(max_length=500)] = {}
-    base: Pose | None = None
+    base: tuple[Small, Small, Annotated[float, Field(ge=-1e3, le=1e3)]] | None = None
     base_sd: tuple[Annotated[float, Field(ge=0, le=100)], Annotated[float, Field(ge=0, le=7)]] | None = None
     gripper: Annotated[dict[str, GripperMessage], Field(max_length=20)] = {}
 

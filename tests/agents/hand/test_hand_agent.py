@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import json
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import tms_agents.hand
 from tms_agents.config import read_config
 from tms_agents.devices.emulation import PtyLine
 from tms_agents.devices.llrp import messages
@@ -22,6 +24,7 @@ from tms_agents.devices.tags import TagRead
 from tms_agents.devices.tr3.codec import Frame
 from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_agents.hand.config import HandConfig
+from tms_agents.hand.setup import make_arm, make_robot
 from tms_client import Spool, cli
 
 EPC, OTHER = "30352B2E4401D3000000007B", "300833B2DDD9CAFEBABE8001"
@@ -154,12 +157,61 @@ def test_unknown_kind_and_missing_file(capsys, tmp_path):
     assert [line[:5] for line in capsys.readouterr().err.splitlines()] == ["tms: "] * 2
 
 
-@pytest.mark.parametrize("name", ["llrp", "tr3", "capture"])
-def test_the_examples_are_valid(name):
-    import tms_agents.hand
+EXAMPLES = Path(tms_agents.hand.__file__).parent / "examples"
 
-    path = Path(tms_agents.hand.__file__).parent / "examples" / f"{name}.toml"
-    assert read_config(path, HandConfig).room == "living-room"
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_the_examples_are_valid(path):
+    config = read_config(path, HandConfig)
+    assert config.room == "living-room"
+    if config.hands:
+        make_robot(config, lambda: "x/1")
+
+
+def test_the_two_arms_of_the_example_mirror_each_other():
+    """One comes from a URDF, the other from a DH table of the mirrored arm."""
+    left, right = (make_arm(hand.arm) for hand in read_config(EXAMPLES / "two-arms.toml", HandConfig).hands)
+    for pan, lift, elbow, wrist in ((0, 0, 0, 0), (0.3, -0.4, 0.8, 1.0), (-0.5, 0.6, -0.2, 0.3)):
+        states = {"left_shoulder_pan": pan, "left_shoulder_lift": lift, "left_elbow": elbow, "left_wrist": wrist}
+        x, y, z = left.gripper(states).xyz
+        mirrored = {name.replace("left", "right"): -value if "pan" in name else value for name, value in states.items()}
+        assert right.gripper(mirrored).xyz == pytest.approx((x, -y, z), abs=1e-6)
+
+
+ROBOT = {"states": {"kind": "stdin"}}
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({}, "give a [source], or [[hands]]"),
+        ({"hands": [{"name": "a"}]}, "[[hands]] and [robot] belong together"),
+        ({"robot": ROBOT, "source": {"kind": "llrp", "host": "h"}}, "[[hands]] and [robot] belong together"),
+        ({"robot": ROBOT, "hands": [{"name": "a"}, {"name": "a"}]}, "two hands have the same name"),
+        ({"robot": ROBOT, "hands": [{"name": "a", "antennas": [1]}]}, "there is no reader"),
+        ({"robot": ROBOT, "hands": [{"name": "a", "arm": {"urdf": "x.urdf"}}]}, "a urdf needs tip_link"),
+        ({"robot": ROBOT, "hands": [{"name": "a", "arm": {}}]}, "give either urdf or dh"),
+        ({"robot": ROBOT, "hands": [{"name": "a"}], "source": {"kind": "capture", "format": "tr3", "path": "x"}},
+         "a capture has no robot"),
+        ({"robot": ROBOT, "hands": [{"name": "a", "arm": {"urdf": "x.urdf", "tip_link": "t"}}]}, "x.urdf: [Errno 2]"),
+    ],
+)  # fmt: skip
+def test_wrong_hands_are_one_line(tmp_path, capsys, more, says):
+    path = tmp_path / "hand.toml"
+    path.write_text('agent = "a"\nroom = "r"\nspool = {path = "s"}\n' + "".join(map(_toml, more.items())))
+    assert cli.main(["agent", "hand", "--config", str(path)]) == 2
+    error = capsys.readouterr().err.splitlines()
+    assert says in error[-1] and error[-1].startswith("tms: ") and not (tmp_path / "s").exists()
+
+
+def _toml(item: tuple[str, object]) -> str:
+    return f"{item[0]} = {_value(item[1])}\n"
+
+
+def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{name} = {_value(one)}" for name, one in value.items()) + "}"
+    return f"[{', '.join(map(_value, value))}]" if isinstance(value, list) else json.dumps(value)
 
 
 def test_the_key_comes_from_the_environment(configure, monkeypatch):

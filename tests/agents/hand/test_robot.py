@@ -219,6 +219,14 @@ def test_a_tag_too_long_for_the_wire_is_none():
     assert butler.books.types() == ["label_appeared", "tag_missed"]
 
 
+@pytest.mark.parametrize("jump", [-3600, 3600])
+def test_a_clock_that_is_set_loses_nothing(jump):
+    butler = carrying()
+    butler.t += jump
+    butler.go(2.0, 4, left=TEA).open("left").go(0, 1.5, left=TEA)
+    assert butler.books.types() == ["label_appeared", "transfer"] and butler.books.kinds() == ["table"]
+
+
 STEP = st.tuples(
     st.sampled_from([0.0, 0.05, 0.3, -0.5]),
     st.sampled_from([0.3, 1.2]),
@@ -251,3 +259,36 @@ def test_every_label_appears_once_and_goes_once_whatever_happens(steps):
     butler.widths = {"left": 0.1, "right": 0.1}
     butler.go(0, 30)
     assert "robot" not in butler.books.kinds()
+
+
+NUMBER = st.floats(-1e4, 1e4) | st.sampled_from([0.0, 1e4, -1e4, 1e-300])
+GRIPPER = st.fixed_dictionaries(
+    {},
+    optional={
+        "closed": st.booleans(),
+        "opening_m": st.floats(-1, 5),
+        "effort": st.floats(-1e6, 1e6),
+        "position": st.tuples(NUMBER, NUMBER, NUMBER),
+    },
+)
+MESSAGE = st.fixed_dictionaries(
+    {},
+    optional={
+        "joints": st.dictionaries(st.sampled_from(["a", "b"]), NUMBER),
+        "base": st.tuples(NUMBER, NUMBER, st.floats(-1e3, 1e3)),
+        "base_sd": st.tuples(st.floats(0, 100), st.floats(0, 7)),
+        "gripper": st.dictionaries(st.sampled_from(["left", "right", "third"]), GRIPPER),
+    },
+)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(MESSAGE, st.floats(-10, 10), st.sampled_from([TEA, CUP, ""])), max_size=30))
+def test_any_valid_message_is_taken(messages):
+    butler = Butler()
+    for message, wait, tag in messages:
+        butler.t += wait
+        if tag:
+            butler.books.take(butler.robot.read("left", butler.now, tag))
+        butler.books.take(butler.robot.message(butler.now, StateMessage.model_validate(message)))
+    butler.books.take([butler.robot.inventory(butler.now)])

@@ -96,6 +96,12 @@ def test_ways_not_to_know(caplog):
     assert own.xy == (1.5, 2) and own.z == 0.8 and own.cov[0] < 0.01
 
 
+def test_nonsense_is_no_place(caplog):
+    posture = Posture({"h": dh_arm([("q", "slides", 0, 0, 0, 0)] * 30, EYE, EYE)})
+    posture.update(StateMessage(joints={"q": 1e4}, base=(0, 0, 0)))
+    assert posture.spot("h", None) is None and "its joints put it" in caplog.text
+
+
 @settings(max_examples=15)
 @given(POSE, POSE, POSE, POSE, POSE)
 def test_the_covariance_is_that_of_many_noisy_robots(x, y, theta, q1, q2):
