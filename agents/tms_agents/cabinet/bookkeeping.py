@@ -7,12 +7,15 @@ so quickly that the board was never steady without it, or simply known better th
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
-from tms_agents.cabinet.fusion import Explanation
+from tms_agents.cabinet.fusion import Doubt, Explanation
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
@@ -40,11 +43,23 @@ class Bookkeeper:
         self.settling: Settling | None = None
         #: What the last step put.
         self.newest: list[Thing] = []
+        #: Slides that may have been another thing's.
+        self.doubts: deque[Doubt] = deque(maxlen=8)
+
+    def doubt(self, step: Step, chosen: Explanation, others: Sequence[Explanation]) -> None:
+        """Remember which other things may have been slid by ``step``."""
+        for other in others:
+            if other.kind == "slide" and other.score > 0.01 * chosen.score:
+                assert chosen.thing is not None and other.thing is not None
+                odds = math.log(other.score / chosen.score)
+                self.doubts.append(Doubt(chosen.thing, other.thing, step.change, odds))
 
     def apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         """Do to the shelf what ``explanation`` says about ``step``."""
         events: list[CabinetEvent] = []
         settling, self.settling = self.settling, None
+        if explanation.undo is not None:
+            events += self._undo(step.now, explanation.undo)
         gone, gone_variance = np.zeros_like(step.change), np.zeros_like(step.change)
         for thing in explanation.removed:
             events.append(self._remove(thing, step, alone=explanation.kind == "take" and len(explanation.removed) == 1))
@@ -73,6 +88,12 @@ class Bookkeeper:
             self.settling = Settling(thing, settling.before, settling.variance, step.now, new=settling.new)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events
+
+    def _undo(self, now: float, doubt: Doubt) -> list[CabinetEvent]:
+        self.doubts.remove(doubt)
+        doubt.thing.load = doubt.thing.load - doubt.change
+        doubt.other.load = doubt.other.load + doubt.change
+        return [*self._tell(doubt.thing, now, always=True), *self._tell(doubt.other, now, always=True)]
 
     def _put_two(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         events: list[CabinetEvent] = []

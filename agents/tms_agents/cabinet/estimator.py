@@ -131,7 +131,7 @@ class CabinetEstimator:
     def _explain(self, step: Step) -> list[CabinetEvent]:
         final = self._detector.is_final(step)
         waited = math.inf if final else step.now - step.settled
-        best = explain(step, self._shelf, self._evidence(step), self._settings)[0]
+        best, *others = explain(step, self._shelf, self._evidence(step), self._settings)
         if best.kind in ("unknown", "press"):
             if waited < self._settings.stubborn_s:
                 self._detector.hold(step)
@@ -140,27 +140,38 @@ class CabinetEstimator:
             else:
                 self._detector.accept(step)
             return []
-        unsure = best.score < 0.9 or not best.tight or self._held(step, best, waited)
-        if unsure and waited < self._settings.patience_s:
+        arm = self._may_be_an_arm(step, best)
+        patience = self._settings.stubborn_s if arm else self._settings.patience_s
+        unsure = arm or best.score < 0.9 or not best.tight or self._looks_pressed(step, best, waited)
+        if unsure and waited < patience:
             self._detector.hold(step)
             return []
-        if final and unsure and step.now - step.settled < _PASSING_S:
+        unsure = unsure or best.kind in ("swap", "two", "joint", "slide")
+        if final and (arm or (unsure and step.now - step.settled < _PASSING_S)):
             self._detector.ignore(step)
             return []
+        if best.kind == "slide":
+            self._book.doubt(step, best, others)
         return self._take(step, best)
 
-    def _held(self, step: Step, best: Explanation, waited: float) -> bool:
-        """Whether a new load looks like a hand or an arm: of no weight that its tag could have, or without any tag."""
-        if best.load is None or best.kind not in ("put", "swap"):
+    def _may_be_an_arm(self, step: Step, best: Explanation) -> bool:
+        """A new load without a tag, not yet steady for long or not as quiet as a thing: somebody may lean on it."""
+        if best.kind not in ("put", "two") or self._namer.loose():
             return False
+        return step.now - step.settled < self._settings.untagged_s or step.restless > self._settings.restless
+
+    def _looks_pressed(self, step: Step, best: Explanation, waited: float) -> bool:
+        """A thing that must be one of some known weights, and is of none of them: a hand still holds it."""
         loose = self._namer.loose()
-        if not loose:
-            return waited < self._settings.untagged_s
-        if None in loose.values() or _PASSING_S < waited < math.inf:
+        if best.load is None or best.kind not in ("put", "swap") or None in loose.values() or not loose:
             return False
         weight, sd = float(best.load.sum()), math.sqrt(float(step.variance.sum()))
-        weights = [known for known in loose.values() if known is not None]
-        return all(abs(weight - known.mean_g) > 4 * math.hypot(sd, known.sd_g) + 2.0 for known in weights)
+        fits = any(
+            abs(weight - known.mean_g) < 4 * math.hypot(sd, known.sd_g) + 2.0
+            for known in loose.values()
+            if known is not None
+        )
+        return not fits and not _PASSING_S < waited < math.inf
 
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         for thing in explanation.removed:
@@ -179,9 +190,9 @@ class CabinetEstimator:
             return 0.0 if thing.tag is None else self._presence.taken(thing.tag, step.settled)
 
         if settling is None:
-            return Evidence(taken, self._namer.loose())
+            return Evidence(taken, self._namer.loose(), doubts=self._book.doubts)
         gap = max(step.onset - settling.posted, 0.0)
-        return Evidence(taken, self._namer.loose(), settling.thing, math.exp(-gap / 0.7))
+        return Evidence(taken, self._namer.loose(), settling.thing, math.exp(-gap / 0.7), self._book.doubts)
 
     def _drifted(self, seconds: float) -> None:
         rate = self._settings.creep_per_hour * (np.abs(self._shelf.total()) + 500.0)

@@ -52,6 +52,16 @@ _LIGHTEST_G, _HEAVIEST_G = 3.0, 20_000.0
 _LOG_RANGE = math.log(math.log(_HEAVIEST_G / _LIGHTEST_G))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Doubt:
+    """A slide by ``change`` (k,) g was given to one thing and may have been another's, with these log-odds."""
+
+    thing: Thing
+    other: Thing
+    change: Array
+    odds: float
+
+
 @dataclass(frozen=True, slots=True)
 class Explanation:
     """``removed`` things leave, ``load`` (k,) is what a new (put, swap) or remaining (slide, adjust) thing has then."""
@@ -67,6 +77,8 @@ class Explanation:
     tags: tuple[str, ...] = ()
     #: The load fits within its noise.
     tight: bool = True
+    #: An earlier slide is taken back and given to another thing.
+    undo: Doubt | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +90,7 @@ class Evidence:
     loose: Mapping[str, KnownWeight | None]
     settling: Thing | None = None
     settling_share: float = 0.0
+    doubts: Sequence[Doubt] = ()
 
 
 def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
@@ -86,8 +99,12 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
     weights = [weight for weight in evidence.loose.values() if weight is not None]
     put = PutDensity(geometry, settings.min_weight_g, weights)
     things = list(shelf.things.values())
+
+    def crowded(load: Array, gone: Thing | None = None) -> float:
+        return _crowded(load, shelf, gone) if settings.knows_places else 0.0
+
     found = [
-        Explanation("put", math.log(_PRIOR["put"]) + put(change, variance) + _crowded(change, shelf), load=change),
+        Explanation("put", math.log(_PRIOR["put"]) + put(change, variance) + crowded(change), load=change),
         Explanation("unknown", math.log(_PRIOR["unknown"]) + put.anything(change, variance)),
     ]
     each = math.log(1.0 / max(len(things), 1))
@@ -102,20 +119,28 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         after = put(left, both)
         if after > -math.inf:
             prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
-            crowd = _crowded(left, shelf, thing)
+            crowd = crowded(left, thing)
             found.append(Explanation("swap", prior + after + crowd, removed=(thing,), load=left))
-            if abs(step.weight_g) < 0.5 * float(thing.load.sum()):
+            if settings.knows_places and abs(step.weight_g) < 0.5 * float(thing.load.sum()):
                 prior = math.log(_PRIOR["slide"]) + each
-                prior += min(max(path_odds(step, -thing.load, same_thing=True), 0.0), 25.0)
+                prior += max(path_odds(step, -thing.load, same_thing=True), 0.0)
                 still, pressed = put.slid(change, left, both)
                 found.append(Explanation("slide", prior + still, thing=thing, load=left))
                 found.append(Explanation("press", prior + math.log(_PRIOR["press"]) + pressed, thing=thing))
-            if step.weight_g > 0 and not (thing is evidence.settling and evidence.settling_share > 0.3):
+            pressed_on = settings.knows_places and step.weight_g > 0
+            if pressed_on and not (thing is evidence.settling and evidence.settling_share > 0.3):
                 prior = math.log(_PRIOR["press"]) + each
                 found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
-            if thing is evidence.settling and evidence.settling_share > 0.01:
+            if settings.knows_places and thing is evidence.settling and evidence.settling_share > 0.01:
                 prior = math.log(_PRIOR["adjust"] * evidence.settling_share)
                 found.append(Explanation("adjust", prior + put.same_place(thing, step), thing=thing, load=left))
+    for doubt in evidence.doubts:
+        for thing, sign in ((doubt.thing, -1.0), (doubt.other, 1.0)):
+            if doubt.thing.id in shelf.things and doubt.other.id in shelf.things:
+                noise = variance + thing.at(step.now, settings.creep_per_hour) + step.variance
+                score = math.log(_PRIOR["take"]) + each + evidence.taken(thing) + doubt.odds
+                score += normal(change + thing.load + sign * doubt.change, noise)
+                found.append(Explanation("take", score, removed=(thing,), undo=doubt))
     found += _two_taken(step, things, noises, taken)
     if step.weight_g > 2 * settings.min_weight_g:
         found += _two_put(step, put, evidence.loose)

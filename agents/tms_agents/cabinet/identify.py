@@ -43,7 +43,7 @@ class Fit:
         log = 0.0
         if self.lifted.get(tag, -math.inf) > thing.since:
             log += _WAS_ELSEWHERE
-        if weight is not None and not thing.joint:
+        if weight is not None:
             # Relative to a broad density of weights, so that unknown weights neither win nor lose.
             sd = math.hypot(weight.sd_g, at.weight_sd_g, 0.01 * weight.mean_g, 1.0)
             peak = math.exp(-0.5 * ((at.weight_g - weight.mean_g) / sd) ** 2) / (sd * math.sqrt(2 * math.pi))

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 class EstimatorSettings:
     """Seconds, grams and metres throughout."""
 
+    #: False for a single scale: all things stand at one place, so a place tells nothing about what happened there.
+    knows_places: bool = True
+
     # --- noise: learned, these are only where learning begins and ends
     #: Samples are averaged over this long before anything else is done with them.
     block_s: float = 0.08
@@ -48,6 +51,8 @@ class EstimatorSettings:
 
     #: A load without a tag must be steady this long: it may be an arm that leans on the board.
     untagged_s: float = 0.9
+    #: ... and no more restless than this, relative to noise.
+    restless: float = 1.6
     #: A change that nothing explains (a hand that presses, a thing half lifted) becomes the new zero only after this.
     stubborn_s: float = 4.0
 

@@ -18,8 +18,8 @@ from tms_agents.cabinet.steps import Step
 _LEAST_BLOCKS = 4
 #: Two changes within less than a block or two are hardly possible.
 _NO_PATH = -6.0
-#: Beyond this a path has other reasons.
-_MOST_ODDS = 10.0
+#: Scale beyond which a misfit counts less.
+_MOST_ODDS = 12.0
 #: How far aside a hand presses, as a share of what it presses.
 _HAND = 0.06
 
@@ -70,7 +70,7 @@ def split(step: Step) -> Split | None:
     misfit = float(cost[i, j]) + float((left**2 / (variance / sd**2)).sum())
     first = scale[0] * directions[0] * sd
     off = scale[0] * (directions[0] - one * float(one @ directions[0]))
-    return Split(first, step.change - first, variance, 0.5 * (single - misfit) - _freedom(off, count))
+    return Split(first, step.change - first, variance, _dampened(0.5 * (single - misfit)) - _freedom(off, count))
 
 
 def path_odds(step: Step, one: Array, *, same_thing: bool = False) -> float:
@@ -94,7 +94,12 @@ def path_odds(step: Step, one: Array, *, same_thing: bool = False) -> float:
     # A hand does not press exactly on the centre of the thing that it moves.
     unit = 1.0 + (_HAND * np.linalg.norm(path, axis=1)) ** 2
     gain = 0.5 * float((aside**2 / unit).sum() - count)
-    return gain if same_thing else min(gain, _MOST_ODDS) - _freedom(off / math.sqrt(float(unit.mean())), count)
+    return _dampened(gain) if same_thing else _dampened(gain) - _freedom(off / math.sqrt(float(unit.mean())), count)
+
+
+def _dampened(gain: float) -> float:
+    """Large misfits have other reasons than noise: they count, but less and less."""
+    return _MOST_ODDS * math.log1p(gain / _MOST_ODDS) if gain > 0 else gain
 
 
 def _freedom(off: Array, count: int) -> float:

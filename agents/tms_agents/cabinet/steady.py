@@ -53,6 +53,10 @@ def steady_tail(blocks: Sequence[Block], old: Array, old_variance: Array, settin
             (length * _ROCKING**2) * (change**2 / variances[tail].mean(axis=0)).sum()
         ):
             return []
+        if float(((along[tail] - size) ** 2 / noise[tail]).sum()) > chi_square_limit(
+            settings.settle_sd + 1.0, length - 1
+        ) + (length * (_ROCKING * size) ** 2 / float(noise[tail].mean())):
+            return []
         if not changed:
             return _extended(blocks, length)
         if _stays(times, along, noise, length) > settings.settle_odds:
@@ -142,6 +146,15 @@ def average(blocks: Sequence[Block]) -> tuple[Array, Array]:
     freedom = (len(blocks) - 1) * len(mean)
     scatter = float(((means - mean) ** 2 / variances).sum()) / freedom if freedom else 1.0
     return mean, (weights**2) @ variances * max(1.0, scatter)
+
+
+def restlessness(blocks: Sequence[Block], change: Array) -> float:
+    """How much more than noise the blocks scatter along ``change``, (k,): about 1 for a thing, more for an arm."""
+    direction = change / blocks[-1].variance
+    along = np.array([b.mean for b in blocks]) @ direction
+    noise = np.array([b.variance for b in blocks]) @ direction**2
+    rocking = (_ROCKING * float(direction @ change)) ** 2
+    return float(((along - along.mean()) ** 2 / (noise + rocking)).sum()) / max(len(blocks) - 1, 1)
 
 
 def chi_square_limit(sd: float, freedom: int) -> float:

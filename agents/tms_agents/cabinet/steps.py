@@ -18,7 +18,7 @@ from tms_agents.cabinet.baseline import Level
 from tms_agents.cabinet.blocks import Block
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.settings import EstimatorSettings
-from tms_agents.cabinet.steady import average, chi_square_limit, steady_tail
+from tms_agents.cabinet.steady import average, chi_square_limit, restlessness, steady_tail
 
 _CHANGING_BLOCKS = 1000
 #: Blocks remembered before a change.
@@ -43,6 +43,8 @@ class Step:
     #: How it went from one to the other: block means (n, k) above the old level, and their variances.
     path: Array
     path_variance: Array
+    #: Scatter of the steady blocks along the change, relative to noise.
+    restless: float
 
     @property
     def weight_g(self) -> float:
@@ -174,6 +176,7 @@ class StepDetector:
             before_variance=self.level.variance,
             path=np.array([block.mean for block in way]).reshape(-1, self._cells) - self.level.mean,
             path_variance=np.array([block.variance for block in way]).reshape(-1, self._cells),
+            restless=restlessness(steady, change),
         )
         total = step.weight_g**2 / float(variance.sum())
         score = max(total, float((change**2 / variance).sum()) / self._whole_limit)
