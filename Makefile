@@ -4,13 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-hand faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
 	@echo "make test      set up and run all tests (SQLite, PostgreSQL, Chromium)"
 	@echo "make check     ruff, mypy strict, import arrows"
 	@echo "make bench     the published numbers of docs/benchmarks.md"
+	@echo "make bench-hand     right and wrong grasps of the hand agent (docs/hand.md)"
 	@echo "make bench-cabinet  the smart cabinet on simulated boards (docs/cabinet_position.png)"
 	@echo "make faults    the long fault tests (30 kills and more)"
 	@echo "make peers     tests against programs of other people (installs tshark)"
@@ -35,6 +36,9 @@ format: $(READY)
 bench: $(READY)
 	$(BIN)/python benchmarks/placement.py
 	$(BIN)/python benchmarks/ingest.py
+
+bench-hand: $(READY)
+	$(BIN)/python benchmarks/hand.py
 
 bench-cabinet: $(READY)
 	$(BIN)/python benchmarks/cabinet.py

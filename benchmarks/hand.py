@@ -41,8 +41,8 @@ CASES = (
     Case("2 neighbours, 20 % missed", 2, 0.2),
     Case("6 neighbours, 20 % missed", 6, 0.2),
     Case("6 neighbours, 40 % missed", 6, 0.4),
-    Case("6 neighbours, 20 % missed, tag shaded for 0.5 to 2 s in every second", 6, 0.2, p_shade=0.5),
-    Case("2 neighbours, 20 % missed, every third falls", 2, 0.2, p_fall=0.33),
+    Case("6 neighbours, 20 % missed, tag shaded for 0.5 to 2 s in half the runs", 6, 0.2, p_shade=0.5),
+    Case("2 neighbours, 20 % missed, a third falls", 2, 0.2, p_fall=0.33),
 )
 
 

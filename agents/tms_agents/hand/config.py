@@ -88,6 +88,7 @@ class GraspSection(Section):
     step_m: Distance = 0.1
     step_s: Seconds = 0.5
     p_read: Chance = 0.8
+    p_none: Chance = 0.1
 
 
 class HandSection(Section):

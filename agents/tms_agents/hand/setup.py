@@ -67,4 +67,5 @@ def make_arm(section: ArmSection) -> Arm:
 def make_settings(section: GraspSection) -> GraspSettings:
     values = section.model_dump()
     fingers = FingerSettings(**{name: values.pop(name) for name in ("open_m", "empty_m", "hold_effort")})
-    return GraspSettings(fingers=fingers, reads=ReadModel(p_read=values.pop("p_read")), **values)
+    reads = ReadModel(**{name: values.pop(name) for name in ("p_read", "p_none")})
+    return GraspSettings(fingers=fingers, reads=reads, **values)
