@@ -179,12 +179,12 @@ class Engine:
 
     def _count_pies(self) -> list[dict[str, float]]:
         """The marginals of every object in play, in the order of its column."""
-        p = thinning.marginals(self._belief.rows, self._belief.w, self._labels.n_slots)
-        pies: list[dict[str, float]] = [{} for _ in range(p.shape[0])]
-        columns, slots = np.nonzero(p >= NEGLIGIBLE)
-        name = self._labels.name
-        for k, slot, share in zip(columns.tolist(), slots.tolist(), p[columns, slots].tolist(), strict=True):
-            pies[k][name(slot)] = share
+        ends, slots, shares = thinning.pies(self._belief.rows, self._belief.w, self._labels.n_slots, NEGLIGIBLE)
+        names, share = self._labels.names(slots.tolist()), shares.tolist()
+        pies, start = [], 0
+        for end in ends.tolist():
+            pies.append(dict(zip(names[start:end], share[start:end], strict=True)))
+            start = end
         return pies
 
     @property

@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+#: The slot of OUT, as in ``labels``.
+OUT_SLOT = 0
 I32 = np.int32
 U64 = np.uint64
 _GOLDEN = U64(0x9E3779B97F4A7C15)
@@ -87,43 +89,68 @@ def content_likelihoods(
 
 @njit(cache=True)
 def give(
-    rows: Any, w: Any, zob: Any, cols: Any,
-    cand_of: Any, logk: Any, near: Any, dest: Any, n_pinned: Any, pin_obj: Any, pin_slot: Any,
-    holding: bool, u: float, stay: float, idle_to_stay: bool,
-    p_jump: float, jumpable: Any, jump_obj: Any, jump_slot: Any, lik: Any,
+    rows: Any, w: Any, zob: Any, cols: Any, pinned: Any,
+    candidates: Any, logk: Any, near: Any, dest: Any, holding: bool, u: float, stay: float, idle_to_stay: bool,
+    p_jump: float, shelf: Any, new: int, from_outside: bool, lik: Any,
 ) -> Any:  # fmt: skip
     """Children of "somebody gave one of the things he holds": appear and hand-over.
 
-    cand_of [S + 1]: candidate index of a slot or -1. logk [Q]: log kernel of each candidate. near [Q]: 1 inside the
-    gate, 0 outside, 2 not subject to it. dest [Q]: where a thing of that candidate goes. n_pinned [Q], pin_obj,
-    pin_slot: certain objects at candidates. ``u`` mass of the giving, ``stay`` mass of nothing moving; an empty-handed
-    candidate's mass is lost, or joins ``stay`` if ``idle_to_stay``. Jump: a thing at a ``jumpable`` slot, or one of
-    jump_obj, goes to dest[0].
-    lik [N + 1]: likelihood of the content of the label after the event.
+    candidates [Q]: slots of those who may have given. logk [Q]: log kernel of each. near [Q]: 1 inside the gate, 0
+    outside, 2 not subject to it. dest [Q]: where a thing of that candidate goes. ``holding``: only those who hold
+    something count. ``u`` mass of the giving, ``stay`` mass of nothing moving; an empty-handed candidate's mass is
+    lost, or joins ``stay`` if ``idle_to_stay``. With ``p_jump`` a thing on the ``shelf`` [S + 1] (not ``new``) or at
+    OUT goes to dest[0]; ``from_outside``: only one at OUT. lik [N + 1]: likelihood of the content of the label after
+    the event.
 
     Returns (parent, obj, to, weight, hash, count).
     """
     n_h, n_k = rows.shape
-    n_q = logk.shape[0]
-    n_jump_pinned = jump_obj.shape[0] if p_jump > 0.0 else 0
-    room = n_h * (1 + n_k + pin_obj.shape[0] + n_jump_pinned)
+    n_q = candidates.shape[0]
+    cand_of = np.full(shelf.shape[0], -1, I32)
+    for q in range(n_q):
+        cand_of[candidates[q]] = q
+    jumpable = np.zeros(shelf.shape[0], np.bool_)
+    if p_jump > 0.0:
+        if not from_outside:
+            jumpable[:] = shelf
+        jumpable[OUT_SLOT] = True
+        jumpable[new] = False
+    n_pinned = np.zeros(n_q, np.int64)
+    pin_obj = np.empty(pinned.shape[0], I32)
+    jump_obj = np.empty(pinned.shape[0], I32)
+    pins = 0
+    jumps = 0
+    for i in range(pinned.shape[0]):
+        slot = pinned[i]
+        if slot < 0:
+            continue
+        if cand_of[slot] >= 0:
+            n_pinned[cand_of[slot]] += 1
+            pin_obj[pins] = i
+            pins += 1
+        if jumpable[slot]:
+            jump_obj[jumps] = i
+            jumps += 1
+
+    room = n_h * (1 + n_k + pins + jumps)
     parent = np.empty(room, I32)
     obj = np.empty(room, I32)
     to = np.empty(room, I32)
     cw = np.empty(room)
     cz = np.empty(room, U64)
     empty = lik[lik.shape[0] - 1]
+    kernel = np.exp(logk - logk.max()) if n_q > 0 else logk
     p = np.zeros(n_q)
     held = np.zeros(n_q, np.int64)
     if not holding and n_q > 0:
-        _normalise(logk, near, held, False, p)
+        _normalise(logk, kernel, near, held, False, p)
     n = 0
     for h in range(n_h):
         wh = w[h]
         zh = zob[h]
         for q in range(n_q):
             held[q] = n_pinned[q]
-        n_jump = n_jump_pinned
+        n_jump = jumps
         for k in range(n_k):
             slot = rows[h, k]
             q = cand_of[slot]
@@ -132,7 +159,7 @@ def give(
             elif jumpable[slot]:
                 n_jump += 1
         still = stay
-        if n_q == 0 or (holding and not _normalise(logk, near, held, True, p)):
+        if n_q == 0 or (holding and not _normalise(logk, kernel, near, held, True, p)):
             still += u
         if idle_to_stay:
             for q in range(n_q):
@@ -147,11 +174,12 @@ def give(
         for k in range(n_k):
             slot = rows[h, k]
             q = cand_of[slot]
-            i = cols[k]
             if q >= 0:
+                i = cols[k]
                 m = wh * u * p[q] / held[q] * lik[i]
                 d = dest[q]
-            elif p_jump > 0.0 and jumpable[slot]:
+            elif jumpable[slot]:
+                i = cols[k]
                 m = wh * p_jump / n_jump * lik[i]
                 d = dest[0]
             else:
@@ -160,45 +188,55 @@ def give(
                 parent[n], obj[n], to[n], cw[n] = h, i, d, m
                 cz[n] = zh ^ zobrist(i, slot) ^ zobrist(i, d)
                 n += 1
-        for j in range(pin_obj.shape[0]):
+        for j in range(pins):
             i = pin_obj[j]
-            q = cand_of[pin_slot[j]]
+            q = cand_of[pinned[i]]
             m = wh * u * p[q] / held[q] * lik[i]
             if m > 0.0:
                 parent[n], obj[n], to[n], cw[n] = h, i, dest[q], m
-                cz[n] = zh ^ zobrist(i, pin_slot[j]) ^ zobrist(i, dest[q])
+                cz[n] = zh ^ zobrist(i, pinned[i]) ^ zobrist(i, dest[q])
                 n += 1
-        for j in range(n_jump_pinned):
+        for j in range(jumps):
             i = jump_obj[j]
             m = wh * p_jump / n_jump * lik[i]
             if m > 0.0:
                 parent[n], obj[n], to[n], cw[n] = h, i, dest[0], m
-                cz[n] = zh ^ zobrist(i, jump_slot[j]) ^ zobrist(i, dest[0])
+                cz[n] = zh ^ zobrist(i, pinned[i]) ^ zobrist(i, dest[0])
                 n += 1
     return parent, obj, to, cw, cz, n
 
 
 @njit(cache=True)
-def _normalise(logk: Any, near: Any, held: Any, only_held: bool, p: Any) -> bool:
-    """p [Q] := kernel over the (feasible) candidates, zero beyond the gate unless nobody is inside it."""
+def _normalise(logk: Any, kernel: Any, near: Any, held: Any, only_held: bool, p: Any) -> bool:
+    """p [Q] := kernel over the (feasible) candidates, zero beyond the gate unless nobody is inside it.
+
+    ``kernel`` is exp(logk - max(logk)), for all rows once; only where all feasible ones are so far away that it
+    underflows are they scaled anew.
+    """
     inside = False
-    top = -np.inf
+    some = False
     for q in range(logk.shape[0]):
         if (not only_held or held[q] > 0) and near[q] == 1:
             inside = True
-    for q in range(logk.shape[0]):
-        p[q] = 0.0
-        if (not only_held or held[q] > 0) and (near[q] != 0 or not inside):
-            p[q] = 1.0
-            top = max(top, logk[q])
-    if top == -np.inf:
-        p[:] = 0.0
-        return False
     total = 0.0
     for q in range(logk.shape[0]):
-        if p[q] > 0.0:
-            p[q] = math.exp(logk[q] - top)
-            total += p[q]
+        p[q] = 0.0
+        if (not only_held or held[q] > 0) and (near[q] != 0 or not inside) and logk[q] > -np.inf:
+            p[q] = kernel[q]
+            total += kernel[q]
+            some = True
+    if not some:
+        return False
+    if total < 1e-200:
+        top = -np.inf
+        for q in range(logk.shape[0]):
+            if (not only_held or held[q] > 0) and (near[q] != 0 or not inside):
+                top = max(top, logk[q])
+        total = 0.0
+        for q in range(logk.shape[0]):
+            if (not only_held or held[q] > 0) and (near[q] != 0 or not inside):
+                p[q] = math.exp(logk[q] - top)
+                total += p[q]
     for q in range(logk.shape[0]):
         p[q] /= total
     return True
@@ -274,6 +312,26 @@ def hashes(rows: Any, cols: Any) -> Any:
         for k in range(rows.shape[1]):
             z[h] ^= zobrist(cols[k], rows[h, k])
     return z
+
+
+@njit(cache=True)
+def settle(
+    rows: Any, cols: Any, col_of: Any, pinned: Any, parent: Any, obj: Any, to: Any, cw: Any, cz: Any, merging: bool
+) -> Any:  # fmt: skip
+    """Merge children (where they may coincide), normalise them, write them out as rows.
+
+    Returns (total mass, w, hashes, rows, cols, touched), see ``build``; a total of 0 changes nothing.
+    """
+    n = parent.shape[0]
+    if merging and n > 1:
+        n = merge(rows, cols, col_of, pinned, parent, obj, to, cw, cz, n)
+    w = cw[:n].copy()
+    total = w.sum()
+    if not total > 0.0:
+        return 0.0, w, cz[:n], rows, cols, cols[:0]
+    w /= total
+    new_rows, new_cols, touched = build(rows, cols, col_of, pinned, parent[:n], obj[:n], to[:n])
+    return total, w, cz[:n].copy(), new_rows, new_cols, touched
 
 
 @njit(cache=True)

@@ -52,6 +52,11 @@ class Labels:
         """The label's id; ``OUT`` for slot 0."""
         return OUT if slot == OUT_SLOT else self._labels[slot].id
 
+    def names(self, slots: list[int]) -> list[str]:
+        """The same for many."""
+        labels = self._labels
+        return [OUT if slot == OUT_SLOT else labels[slot].id for slot in slots]
+
     def states(self) -> dict[str, LabelState]:
         """Every label by id, in order of appearance."""
         return {label.id: LabelState(label.kind, label.xy, label.ghost) for label in self._labels.values()}

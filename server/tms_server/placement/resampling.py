@@ -21,27 +21,32 @@ def generator(key: DrawKey) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=np.frombuffer(digest, "<u8").astype(np.uint64)))
 
 
+def uniform(key: DrawKey, n: int) -> float:
+    """The n-th uniform draw in [0, 1) of one event, from the hash itself: a generator for one number costs more."""
+    name = f"{key.seed}\x00{key.agent}\x00{key.seq}\x00{n}".encode()
+    return int.from_bytes(hashlib.blake2b(name, digest_size=8).digest(), "little") / 2**64
+
+
 class Budget:
     """Thins the children of one event to ``most``; random numbers are drawn only if that is needed."""
 
     def __init__(self, most: int, key: DrawKey) -> None:
         self._most, self._key = most, key
-        self._rng: np.random.Generator | None = None
+        self._draws = 0
 
     @property
     def exceeded(self) -> bool:
         """Whether the set had to be thinned."""
-        return self._rng is not None
+        return self._draws > 0
 
     def __call__(self, w: Array) -> tuple[Array, Array] | None:
         """Which of the normalised children to keep, and their new weights; None keeps all."""
         if w.size <= self._most:
             return None
-        if self._rng is None:
-            self._rng = generator(self._key)
         c = thinning.threshold(w, self._most)
         weights = w.copy()
-        keep = thinning.thin(weights, c, self._rng.random(), self._most)
+        keep = thinning.thin(weights, c, uniform(self._key, self._draws), self._most)
+        self._draws += 1
         kept = weights[keep]
         return keep, kept / kept.sum()
 

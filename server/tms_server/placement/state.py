@@ -78,17 +78,10 @@ class Hypotheses:
         Returns (total mass, objects that were in play or moved). A total of 0 leaves everything as it is.
         """
         rows = self.rows if rows is None else rows
-        parent, obj, to, mass, zob = children
-        n = parent.size
-        if merge and n > 1:
-            n = kernels.merge(rows, self.cols, self.col_of, self.pinned, parent, obj, to, mass, zob, n)
-            parent, obj, to, mass, zob = parent[:n], obj[:n], to[:n], mass[:n], zob[:n]
-        total = float(mass.sum())
+        total, w, zob, new, cols, touched = kernels.settle(rows, self.cols, self.col_of, self.pinned, *children, merge)
         if not total > 0.0:
-            return 0.0, np.empty(0, np.int32)
-        w = mass / total
-        self.rows, self.cols, touched = kernels.build(rows, self.cols, self.col_of, self.pinned, parent, obj, to)
-        self.w, self.zob = w, zob
+            return 0.0, touched
+        self.rows, self.cols, self.w, self.zob = new, cols, w, zob
         chosen = None if limit is None else limit(w)
         if chosen is not None:
             self._thin(*chosen)

@@ -22,23 +22,47 @@ def marginals(rows: Any, w: Any, slots: int) -> Any:
 
 
 @njit(cache=True)
+def pies(rows: Any, w: Any, slots: int, negligible: float) -> Any:
+    """The marginals of every object in play, without what is below ``negligible``.
+
+    Returns (ends [K], slots [n], probabilities [n]): those of column k stand before ends[k], after ends[k - 1].
+    """
+    p = marginals(rows, w, slots)
+    n_k = p.shape[0]
+    ends = np.empty(n_k, np.int64)
+    found = np.empty(n_k * slots, I32)
+    share = np.empty(n_k * slots)
+    n = 0
+    for k in range(n_k):
+        for s in range(slots):
+            if p[k, s] >= negligible:
+                found[n] = s
+                share[n] = p[k, s]
+                n += 1
+        ends[k] = n
+    return ends, found[:n], share[:n]
+
+
+@njit(cache=True)
 def threshold(cw: Any, budget: int) -> Any:
     """Fearnhead and Clifford's c: sum of min(w / c, 1) = budget. Weights above c are kept as they are."""
-    rest = cw.sum()
-    c = rest / budget
-    kept = -1
+    small = cw.copy()
+    n = small.shape[0]
+    above = 0
+    c = small.sum() / budget
     while True:
         rest = 0.0
-        above = 0
-        for i in range(cw.shape[0]):
-            if cw[i] > c:
-                above += 1
-            else:
-                rest += cw[i]
-        # Equal weights at c: rounding may lift c over them again, and the count must not fall back for ever.
-        if above <= kept or above >= budget:
+        left = 0
+        # c falls from round to round, so that what is above it stays above: only the others are looked at again.
+        for i in range(n):
+            if small[i] <= c:
+                small[left] = small[i]
+                left += 1
+                rest += small[i]
+        above += n - left
+        if left == n or above >= budget:
             return c
-        kept = above
+        n = left
         c = rest / (budget - above)
 
 

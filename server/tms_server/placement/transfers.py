@@ -82,27 +82,12 @@ def _give(
     from_outside: bool = False,
     idle_to_stay: bool = False,
 ) -> Children:
-    belief, slots = world.belief, world.labels.n_slots
-    # One entry more than there are slots, so that the -1 of objects in play finds "no candidate".
-    cand_of = np.full(slots + 1, -1, np.int32)
-    cand_of[candidates] = np.arange(len(candidates), dtype=np.int32)
-    where = cand_of[belief.pinned]
-    pin_obj = np.flatnonzero(where >= 0).astype(np.int32)
-    p_jump, new = jump
-    if p_jump > 0.0:
-        jumpable = np.zeros(slots + 1, np.bool_) if from_outside else world.labels.shelf()
-        jumpable[OUT_SLOT] = True
-        jumpable[new] = False
-        jumpable[-1] = False
-        jump_obj = np.flatnonzero(jumpable[belief.pinned]).astype(np.int32)
-    else:
-        jumpable, jump_obj = np.zeros(slots + 1, np.bool_), _NO_OBJECTS
+    belief, (p_jump, new) = world.belief, jump
     return cut(
         kernels.give(
-            belief.rows, belief.w, belief.zob, belief.cols,
-            cand_of, log_kernel, near, dest, np.bincount(where[pin_obj], minlength=len(candidates)),
-            pin_obj, belief.pinned[pin_obj], holding, float(u), float(stay), idle_to_stay,
-            float(p_jump), jumpable, jump_obj, belief.pinned[jump_obj], likelihood,
+            belief.rows, belief.w, belief.zob, belief.cols, belief.pinned,
+            np.array(candidates, np.int32), log_kernel, near, dest, holding, float(u), float(stay), idle_to_stay,
+            float(p_jump), world.labels.shelf(), new, from_outside, likelihood,
         )
     )  # fmt: skip
 
