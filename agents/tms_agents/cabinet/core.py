@@ -21,6 +21,7 @@ from tms_agents.cabinet.story import told
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.tags import Field, RoundEnd, TagItem
 from tms_agents.devices.transport import DeviceState
+from tms_agents.readers import tells_rounds
 from tms_schemas.observation import Inventory, Observation, RawRead
 
 log = logging.getLogger(__name__)
@@ -32,7 +33,7 @@ class Reader:
 
     def __init__(self, section: ReaderSection, boards: Sequence[str]) -> None:
         self.section, self.boards, self.field = section, tuple(boards), Field()
-        self.rounds = Rounds(section.antennas, section.zone, section.window_s)
+        self.rounds = Rounds(section.antennas, section.zone, section.window_s, tells_ends=tells_rounds(section.source))
         self.turns = (
             FieldTurns(self.field, section.weigh_s, section.antenna_count) if section.weigh_s is not None else None
         )

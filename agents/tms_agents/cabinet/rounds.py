@@ -19,18 +19,23 @@ class Round(NamedTuple):
 
 
 class Rounds:
-    """Collects per antenna. A reader that tells the end of its rounds is believed; of any other, what it reported
+    """Collects per antenna. Where the reader ``tells_ends`` of its rounds, only those count; of any other, what it
 
-    within ``window_s`` seconds is a round. Antennas that share a zone are one: its round is complete when each of them
+    reported within ``window_s`` seconds is a round. Antennas that share a zone are one: its round is complete when each of them
     was asked. Tags longer than 64 digits do not exist on the wire and are left out.
     """
 
-    def __init__(self, zones: Mapping[int, str], rest: str | None, window_s: float) -> None:
-        """``zones`` by antenna; ``rest`` is the zone of antennas that are not named, None ignores them."""
+    def __init__(
+        self, zones: Mapping[int, str], rest: str | None, window_s: float, *, tells_ends: bool = False
+    ) -> None:
+        """``zones`` by antenna; ``rest`` is the zone of antennas that are not named, None ignores them.
+
+        ``tells_ends``: known to tell the end of its rounds, so that none it leaves out is made up from a window.
+        """
         self._zones, self._rest, self._window_s = dict(zones), rest, window_s
         self._tags: dict[int, set[str]] = {}
         self._done: dict[str, dict[int, frozenset[str]]] = {}
-        self._tells_ends = False
+        self._tells_ends = tells_ends
         self._window_end: float | None = None
 
     def take(self, t: float, items: Sequence[TagItem]) -> list[Round]:
@@ -40,7 +45,6 @@ class Rounds:
             if zone is None:
                 continue
             if isinstance(item, RoundEnd):
-                self._tells_ends = True
                 rounds += self._antenna_done(t, zone, item.antenna)
             elif len(item.tag) <= 64 and len(tags := self._tags.setdefault(item.antenna, set())) < _MAX_TAGS:
                 tags.add(item.tag.upper())

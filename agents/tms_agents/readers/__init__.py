@@ -9,7 +9,7 @@ from tms_agents.readers.config import (
     Tr3SerialSource,
     Tr3TcpSource,
 )
-from tms_agents.readers.opening import Arrival, Seen, can_pause, open_reader
+from tms_agents.readers.opening import Arrival, Seen, can_pause, open_reader, tells_rounds
 
 __all__ = [
     "Arrival",
@@ -23,4 +23,5 @@ __all__ = [
     "Tr3TcpSource",
     "can_pause",
     "open_reader",
+    "tells_rounds",
 ]

@@ -69,6 +69,15 @@ def can_pause(source: ReaderSource) -> bool:
     return polled or isinstance(source, ThingMagicSource)
 
 
+def tells_rounds(source: ReaderSource) -> bool:
+    """Whether the reader tells the end of each round. One that withholds it then says that a round was no whole one."""
+    if isinstance(source, LlrpSource):
+        return source.round_s is not None
+    if isinstance(source, ThingMagicSource):
+        return source.mode == "multiple"
+    return isinstance(source, Tr3SerialSource | Tr3TcpSource) and source.mode == "inventory"
+
+
 def _link(
     source: LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource, silent_after_s: float, field: Field | None
 ) -> Link[TagItem]:
