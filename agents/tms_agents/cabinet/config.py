@@ -85,7 +85,8 @@ class BoardSection(Section):
         return Geometry(tuple((x, y) for x, y in cells), self.width, self.depth)
 
     def settings(self) -> EstimatorSettings:
-        return EstimatorSettings(**_Settings.model_validate(self.estimator).model_dump(exclude_unset=True))
+        tuned = _Settings.model_validate(self.estimator).model_dump(exclude_unset=True)
+        return EstimatorSettings(**tuned, knows_places=self.cells is not None)
 
     def frame(self) -> BoardPose:
         return BoardPose(self.pose.x, self.pose.y, self.pose.theta, self.pose.z, self.surface)
@@ -204,6 +205,7 @@ _Settings: type[Section] = create_model(  # type: ignore[call-overload]
     **{
         one.name: (Annotated[float, Field(ge=0)], asdict(EstimatorSettings())[one.name])
         for one in fields(EstimatorSettings)
+        if one.name != "knows_places"
     },
 )
 

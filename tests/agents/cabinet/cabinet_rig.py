@@ -12,6 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
+from tms_agents.cabinet.calibration_file import read_calibration
+from tms_agents.cabinet.config import CabinetConfig
+from tms_agents.cabinet.runner import run
+from tms_agents.config import read_config
+from tms_agents.running import Posted
+from tms_client import Town
+from tms_schemas.agents import AgentView
+from tms_schemas.belief import LabelView
+
 WIDTH, DEPTH = 0.465, 0.317
 CELLS = ((0.04, 0.047), (0.425, 0.047), (0.04, 0.27), (0.425, 0.27))
 GAIN, OFFSET = 0.5, (1000, -200, 40, 3000)
@@ -88,3 +97,50 @@ async def until(true: Callable[[], bool], timeout_s: float = 20.0) -> None:
     async with asyncio.timeout(timeout_s):
         while not await asyncio.to_thread(true):
             await asyncio.sleep(0.05)
+
+
+class Rig:
+    """One cabinet with an agent in this process: put and take things, look at the server."""
+
+    def __init__(self, town: Town, name: str, config: Path) -> None:
+        self.town, self.name, self.config = town, name, config
+
+    @property
+    def agent_name(self) -> str:
+        return f"{self.name}-cabinet"
+
+    async def view(self) -> AgentView:
+        return await asyncio.to_thread(self.town.agents.get, self.agent_name)
+
+    async def labels(self) -> dict[str, LabelView]:
+        return {one.label: one for one in (await asyncio.to_thread(self.town.labels, self.name)).labels}
+
+    async def state(self, state: str, why: str = "", timeout_s: float = 20.0) -> AgentView:
+        """Wait until the server shows this state, with this in its reason."""
+        view = await self.view()
+        try:
+            async with asyncio.timeout(timeout_s):
+                while view.state != state or why not in view.why:
+                    await asyncio.sleep(0.05)
+                    view = await self.view()
+        except TimeoutError:
+            raise AssertionError(f"not {state} ({why}) within {timeout_s} s, but {view.state}: {view.why}") from None
+        return view
+
+    async def count(self, labels: int, timeout_s: float = 10.0) -> dict[str, LabelView]:
+        """Wait until the server has so many labels."""
+        async with asyncio.timeout(timeout_s):
+            while len(found := await self.labels()) != labels:
+                await asyncio.sleep(0.05)
+        return found
+
+    @contextlib.asynccontextmanager
+    async def agent(self, **options: object) -> AsyncIterator[asyncio.Task[Posted]]:
+        config = read_config(self.config, CabinetConfig)
+        calibrations = read_calibration(config.calibration_path(self.config))
+        task = asyncio.create_task(run(config, calibrations, drain_s=2.0, **options))  # type: ignore[arg-type]
+        try:
+            yield task
+        finally:
+            task.cancel()
+            await task
