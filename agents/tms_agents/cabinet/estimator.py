@@ -130,8 +130,13 @@ class CabinetEstimator:
 
     def _explain(self, step: Step) -> list[CabinetEvent]:
         final = self._detector.is_final(step)
-        waited = math.inf if final else step.now - step.settled
-        best, *others = explain(step, self._shelf, self._evidence(step), self._settings)
+        steady = step.now - step.settled
+        waited = math.inf if final else steady
+        explanations = explain(step, self._shelf, self._evidence(step), self._settings)
+        if steady > self._settings.patience_s and waited > self._settings.stubborn_s:
+            # No hand presses for so long.
+            explanations = [item for item in explanations if item.kind != "press"]
+        best, *others = explanations
         if best.kind in ("unknown", "press"):
             if waited < self._settings.stubborn_s:
                 self._detector.hold(step)
@@ -142,17 +147,23 @@ class CabinetEstimator:
             return []
         arm = self._may_be_an_arm(step, best)
         patience = self._settings.stubborn_s if arm else self._settings.patience_s
-        unsure = arm or best.score < 0.9 or not best.tight or self._looks_pressed(step, best, waited)
+        unsure = arm or self._unclear(step, best) or self._looks_pressed(step, best, waited)
         if unsure and waited < patience:
             self._detector.hold(step)
             return []
-        unsure = unsure or best.kind in ("swap", "two", "joint", "slide")
-        if final and (arm or (unsure and step.now - step.settled < _PASSING_S)):
+        if final and (arm or (steady < _PASSING_S and (unsure or best.several))):
             self._detector.ignore(step)
             return []
         if best.kind == "slide":
             self._book.doubt(step, best, others)
         return self._take(step, best)
+
+    def _unclear(self, step: Step, best: Explanation) -> bool:
+        if not best.several:
+            return best.score < 0.9 or not best.tight
+        tags = [thing.tag for thing in best.removed if thing.tag is not None]
+        heard = all(any(self._presence.rounds(tag, step.settled)) for tag in tags)
+        return best.score < 0.97 or not heard
 
     def _may_be_an_arm(self, step: Step, best: Explanation) -> bool:
         """A new load without a tag, not yet steady for long or not as quiet as a thing: somebody may lean on it."""

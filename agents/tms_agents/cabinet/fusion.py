@@ -43,6 +43,8 @@ _TWO_TAKEN = 0.03
 #: Two things put at once: usually, and while two tags that are at no stay are in view.
 _TWO_PUT, _TWO_PUT_TAGS = 0.02, 0.2
 _LOOSE_TRIED = 6
+#: How often a slid thing is steady while a hand still presses or pulls it.
+_PRESSED_SLIDE = 0.03
 #: How often a thing was measured badly: pressed, or under a leaning arm.
 _LOOSE = 0.01
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
@@ -79,6 +81,11 @@ class Explanation:
     tight: bool = True
     #: An earlier slide is taken back and given to another thing.
     undo: Doubt | None = None
+
+    @property
+    def several(self) -> bool:
+        """More than one thing, or more than one change of one: not what usually happens."""
+        return self.kind in ("swap", "two", "joint", "slide") or len(self.removed) > 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +133,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
                 prior += max(path_odds(step, -thing.load, same_thing=True), 0.0)
                 still, pressed = put.slid(change, left, both)
                 found.append(Explanation("slide", prior + still, thing=thing, load=left))
-                found.append(Explanation("press", prior + math.log(_PRIOR["press"]) + pressed, thing=thing))
+                found.append(Explanation("press", prior + math.log(_PRESSED_SLIDE) + pressed, thing=thing))
             pressed_on = settings.knows_places and step.weight_g > 0
             if pressed_on and not (thing is evidence.settling and evidence.settling_share > 0.3):
                 prior = math.log(_PRIOR["press"]) + each
@@ -134,6 +141,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             if settings.knows_places and thing is evidence.settling and evidence.settling_share > 0.01:
                 prior = math.log(_PRIOR["adjust"] * evidence.settling_share)
                 found.append(Explanation("adjust", prior + put.same_place(thing, step), thing=thing, load=left))
+    found += _taken_and_pressed(step, found, things, put)
     for doubt in evidence.doubts:
         for thing, sign in ((doubt.thing, -1.0), (doubt.other, 1.0)):
             if doubt.thing.id in shelf.things and doubt.other.id in shelf.things:
@@ -160,6 +168,23 @@ def _crowded(load: Array, shelf: Shelf, gone: Thing | None = None) -> float:
         float(np.hypot(*(at - thing.centre(shelf.geometry).xy))) for thing in shelf.things.values() if thing is not gone
     ]
     return math.log(1.0 - 0.95 * math.exp(-0.5 * (min(near) / _CROWDED_M) ** 2)) if near else 0.0
+
+
+def _taken_and_pressed(
+    step: Step, found: Sequence[Explanation], things: Sequence[Thing], put: PutDensity
+) -> list[Explanation]:
+    """What looks like a swap may be a thing taken, and the hand already on the next one."""
+    swaps = sorted((item for item in found if item.kind == "swap"), key=lambda item: -item.score)[:2]
+    pressed = []
+    for swap in swaps:
+        assert swap.load is not None
+        left = replace(step, change=swap.load)
+        for thing in things:
+            if thing not in swap.removed:
+                prior = math.log(_PRIOR["take"] * _PRIOR["press"]) - 2 * math.log(len(things))
+                prior += path_odds(step, step.change - swap.load)
+                pressed.append(Explanation("press", prior + put.same_place(thing, left, _HAND_M), thing=thing))
+    return pressed
 
 
 def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list[float]) -> list[Explanation]:
@@ -255,7 +280,7 @@ class PutDensity:
         place = off_board(load, variance, self._geometry) - math.log(self._area) - 2 * math.log(weight)
         place += self._twist(load, variance, weight) + self._jacobian
         still = -0.5 * (more**2 / sd2 + math.log(2 * math.pi * sd2))
-        return still + place, (-math.log(weight) if more > 0 else -math.inf) + place
+        return still + place, -math.log(weight) + place
 
     def anything(self, change: Array, variance: Array) -> float:
         """Density of a change that no thing makes: any size and sign, shared among the cells in any way."""
