@@ -131,7 +131,7 @@ class Session:
                 case Alone(tag):
                     await self._alone(tag)
                 case Again(tag):
-                    self._say.good(f"Tag {tag} is done already. The next thing, please.")
+                    self._say.good(f"Tag {tag} is known already. The next thing, please.")
                 case Waiting(code, instead_of):
                     self._say.good(words.scanned(code, await self._product(code), instead_of))
                 case Several(tags):

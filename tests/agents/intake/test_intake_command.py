@@ -88,6 +88,26 @@ def test_keys(intake, tmp_path, capsys):
         assert (done.returncode, done.stdout) == (1, "") and "the server wants a key" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ('rooom = "lab"', "rooom"),
+        ("expires_s = 0", "expires_s"),
+        ('[reader]\nkind = "tr4"', "reader"),
+        ('[scanner]\nkind = "tcp"\nhost = "x"\nport = 0', "scanner.tcp.port"),
+        ("room", "intake.toml"),
+    ],
+)
+def test_a_wrong_configuration_is_one_clear_line(intake, configure, text, part):
+    done = intake("--config", configure(text))
+    assert done.returncode == 2 and part in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+def test_a_device_that_can_never_work_ends_it(piped, configure):
+    done = piped("--config", configure('[reader]\nkind = "capture"\nformat = "tr3"\npath = "nowhere.bin"'))
+    assert done.returncode == 2 and "nowhere.bin" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
 def test_no_server(intake):
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
@@ -139,7 +159,7 @@ async def test_a_person_with_a_scanner_in_keyboard_mode(carer, town):
     screen.type(TEA)
     await screen.sees(f"Registered: .* tag {TAG.format(0x12)}")
     screen.type(TAG.format(0x11))
-    await screen.sees("is done already")
+    await screen.sees("is known already")
     screen.type("E004000000000001")
     await screen.sees("This is registered: scissors, tag E004000000000001, room lab")
     screen.type("4901777018687")
