@@ -41,17 +41,17 @@ def upgrade() -> None:
         sa.Column("offset", sa.BigInteger(), autoincrement=False, nullable=False),
         sa.Column("agent", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False),
         sa.Column("seq", sa.BigInteger(), nullable=False),
-        sa.Column("records", sa.BigInteger(), nullable=False),
-        sa.Column("first_at", sa.BigInteger(), nullable=False),
-        sa.Column("last_at", sa.BigInteger(), nullable=False),
+        sa.Column("observed_at", sa.BigInteger(), nullable=False),
         sa.Column("received_at", sa.BigInteger(), nullable=False),
-        sa.Column("late", sa.Boolean(), nullable=False),
+        sa.Column("kind", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False),
         sa.Column("body", sa.Text().with_variant(sa.Text(collation="C"), "postgresql"), nullable=False),
+        sa.Column("late", sa.Boolean(), nullable=False),
         sa.PrimaryKeyConstraint("room", "offset", name=op.f("pk_log")),
         sa.UniqueConstraint("agent", "seq", name="uq_log_agent"),
+        sqlite_with_rowid=False,
     )
     with op.batch_alter_table("log", schema=None) as batch_op:
-        batch_op.create_index("ix_log_position", ["room", "first_at", "agent", "seq"], unique=False)
+        batch_op.create_index("ix_log_position", ["room", "observed_at", "agent", "seq"], unique=False)
 
     op.create_table(
         "products",
@@ -73,7 +73,6 @@ def upgrade() -> None:
         sa.Column("created_at", sa.BigInteger(), nullable=False),
         sa.Column("updated_at", sa.BigInteger(), nullable=False),
         sa.Column("head", sa.BigInteger(), nullable=False),
-        sa.Column("newest_at", sa.BigInteger(), nullable=True),
         sa.PrimaryKeyConstraint("room", name=op.f("pk_rooms")),
     )
     op.create_table(

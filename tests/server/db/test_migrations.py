@@ -13,12 +13,17 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect
+from sqlalchemy import Connection, inspect, text
 from sqlalchemy.ext.asyncio import AsyncEngine
 
+from tms_schemas.observation import MoverLeft
+from tms_server.clock import SystemClock
 from tms_server.db.engine import WRITE, create_engine
 from tms_server.db.migrate import alembic_config, is_current, migrate
 from tms_server.db.tables import Base
+from tms_server.log.bodies import ObjectRemoved
+from tms_server.log.record import Record
+from tms_server.log.sql import SqlRoomLog
 
 T = TypeVar("T")
 
@@ -97,3 +102,37 @@ def test_they_run_from_the_package_whatever_the_directory(tmp_path: Path) -> Non
     command = [sys.executable, "-m", "tms_client", "keys", "create", "x", "--scope", "admin", "--data-dir", "data"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=60)
     assert (tmp_path / "data" / "tms.sqlite").stat().st_size > 0
+
+
+async def test_a_log_of_rows_becomes_a_log_of_blocks(engine: AsyncEngine) -> None:
+    """A database of the first release: the same records are read from it, and again after going back."""
+    await migrate(engine, "0001")
+    log = ('{"seq":7,"observed_at":"1970-01-01T00:00:00.000005Z","type":"mover_left","label":"floor/1"}', "mover_left")
+    registry = ('{"type":"object_removed","tag":"E1"}', "registry")
+    async with engine.execution_options(**{WRITE: True}).begin() as connection:
+        for statement in (
+            "insert into rooms (room, body, created_at, updated_at, head) values ('lab', '{}', 0, 0, 2)",
+            f"insert into log values ('lab', 1, '@lab', 1, 0, 3, '{registry[1]}', '{registry[0]}', false)",
+            f"insert into log values ('lab', 2, 'floor', 7, 5, 9, '{log[1]}', '{log[0]}', false)",
+        ):
+            await connection.exec_driver_sql(statement)
+    await migrate(engine)
+
+    async def read() -> list[Record]:
+        return await SqlRoomLog(engine, SystemClock(), retention_s=None).read("lab", 0, 10)
+
+    first, second = await read()
+    assert (first.offset, first.kind, first.content) == (1, "registry", ObjectRemoved(tag="E1"))
+    assert (second.offset, second.seq, second.observed_at, second.received_at) == (2, 7, 5, 9)
+    assert second.content == MoverLeft.model_validate_json(log[0])
+    async with engine.connect() as connection:
+        assert await connection.scalar(text("select newest_at from rooms")) == 5
+
+    await within(engine, downgrade("0001"))
+    async with engine.connect() as connection:
+        rows = (
+            await connection.execute(text('select "offset", agent, seq, observed_at, kind from log order by 1'))
+        ).all()
+    assert [tuple(row) for row in rows] == [(1, "@lab", 1, 0, "registry"), (2, "floor", 7, 5, "mover_left")]
+    await migrate(engine)
+    assert await read() == [first, second]
