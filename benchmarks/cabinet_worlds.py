@@ -56,6 +56,8 @@ SCENES: dict[str, Scene] = {
     ),
     # The defaults: what the laboratory's board is said to be.
     "cabinet": Scene(board=_CABINET),
+    # The same with cells that get stuck for a while, and power cuts.
+    "faults": Scene(board=_CABINET, life=LifeParameters(stuck_share=0.03, power_share=0.05)),
 }
 
 UNSEEN: dict[str, Scene] = {
@@ -92,7 +94,6 @@ UNSEEN: dict[str, Scene] = {
         board=replace(_CABINET, hands=HandParameters(slow_share=0.5, press_share=0.8, press_g=200.0)),
         life=LifeParameters(rest_s=(4.0, 8.0), pair_share=0.3, lean_share=0.1, tagged_share=0.6),
     ),
-    "faults": Scene(board=_CABINET, life=LifeParameters(stuck_share=0.03, power_share=0.05)),
     "soft board": Scene(board=replace(_CABINET, torsion=0.2)),
     "coarse": Scene(
         board=replace(_CABINET, electronics=CellParameters(gram_per_count=10.0, noise_sd_g=2.0, gain_error_sd=0.003))
