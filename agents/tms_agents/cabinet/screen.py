@@ -34,8 +34,8 @@ def screen(view: dict[str, Any], *, columns: int = 80, rows: int = 24, colour: b
 
 
 def _head(view: dict[str, Any], columns: int) -> str:
-    left = f"{view['agent']} in {view['room']}"
-    right = f"{_clock(view['at'])}  from {'the running agent' if view['source'] == 'agent' else 'the devices'}"
+    right = f"  {_clock(view['at'])}  from {'the running agent' if view['source'] == 'agent' else 'the devices'}"
+    left = _fit(f"{view['agent']} in {view['room']}", max(1, columns - len(right)))
     return _fit(f"{left}{right:>{max(1, columns - _width(left))}}", columns)
 
 

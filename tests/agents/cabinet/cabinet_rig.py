@@ -20,6 +20,7 @@ from tms_agents.running import Posted
 from tms_client import Town
 from tms_schemas.agents import AgentView
 from tms_schemas.belief import LabelView
+from tms_schemas.objects import ObjectFields
 
 WIDTH, DEPTH = 0.465, 0.317
 CELLS = ((0.04, 0.047), (0.425, 0.047), (0.04, 0.27), (0.425, 0.27))
@@ -108,6 +109,9 @@ class Rig:
     @property
     def agent_name(self) -> str:
         return f"{self.name}-cabinet"
+
+    def register(self, tag: str, name: str, weight_g: float | None = None) -> None:
+        self.town.objects.put(tag, ObjectFields(name=name, room=self.name, weight_g=weight_g))
 
     async def view(self) -> AgentView:
         return await asyncio.to_thread(self.town.agents.get, self.agent_name)

@@ -72,7 +72,7 @@ async def test_faults_of_a_reader(rig):
     async with PtyLine(RosTmsBoardDevice(shelf.counts)) as board, PtyLine(reader) as line:
         source = f'{{kind = "tr3-serial", device = "{line.path}", poll_s = 0.1}}'
         cabinet = rig(f'{{kind = "ros-tms", device = "{board.path}"}}', reader=source)
-        cabinet.town.intake(MILK, name="Milk", room=cabinet.name)
+        cabinet.register(MILK, "Milk")
         async with cabinet.agent():
             await cabinet.state("connected", "reader")
             shelf.put("milk", 500, 0.1, 0.2)
