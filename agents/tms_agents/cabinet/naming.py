@@ -69,7 +69,20 @@ class Namer:
         # A weight that does not fit is out of date.
         if weight is not None and abs(at.weight_g - weight.mean_g) < 4 * (at.weight_sd_g + weight.sd_g) + 1.0:
             thing.known = weight
+            if thing.joint:
+                self._weigh_apart(thing, weight)
         return Identified(now, thing.id, tag)
+
+    def _weigh_apart(self, thing: Thing, weight: KnownWeight) -> None:
+        """The weight of a thing that came together with others tells about the others too."""
+        spread = float(thing.variance.sum())
+        gain = thing.variance / (spread + weight.sd_g**2)
+        change = gain * (weight.mean_g - float(thing.load.sum()))
+        thing.load = thing.load + change
+        thing.variance = thing.variance * (1 - 0.9 * gain)
+        partners = [self._shelf.things[i] for i in thing.joint if i in self._shelf.things]
+        for partner in partners:
+            partner.load = partner.load - change / len(partners)
 
     def left(self, thing: Thing, now: float, weight_g: float, sd_g: float) -> None:
         """A thing was lifted: remember what it weighed."""

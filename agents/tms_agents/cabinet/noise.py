@@ -17,6 +17,8 @@ from tms_agents.cabinet.settings import EstimatorSettings
 
 #: Blocks in the running median, and the median of such a mean of squares relative to its mean.
 _RECENT, _MEDIAN_BIAS = 7, 0.94
+#: The same for the bends of the block means, and how large they must be to be more than chance.
+_BENDS, _BEND_BIAS, _SHAKING = 9, 0.8, 1.8
 
 
 class Noise:
@@ -30,6 +32,7 @@ class Noise:
         self._age = 0.0
         self._recent: deque[float] = deque(maxlen=_RECENT)
         self._means: deque[Array] = deque(maxlen=2)
+        self._bends: deque[float] = deque(maxlen=_BENDS)
 
     @property
     def sd_g(self) -> Array:
@@ -51,16 +54,29 @@ class Noise:
             return
         white = self.variance * self.factor / block.n
         if len(self._means) == 2:
+            bend = (block.mean - 2 * self._means[1] + self._means[0]) ** 2 / 6
+            self._bends.append(float((bend / white).mean()))
             scatter = float((((block.mean - self._means[0]) ** 2) / (2 * white)).mean())
             # Steps are rare and large: what is beyond a generous limit counts as a step.
             share = min(block.end - block.start, 1.0) / self._settings.noise_memory_s
             self.excess = max(1.0, self.excess + share * (min(scatter, 4 * self.excess) - self.excess))
         self._means.append(block.mean)
-        block.variance = white * self.excess
+        block.variance = white * max(self.excess, self._shaking())
+
+    def _shaking(self) -> float:
+        """Scatter of block means just now relative to white noise, 1 while nothing shakes the board.
+
+        Vibration near a multiple of the sampling rate looks slow, so that the samples themselves hardly show it.
+        """
+        if len(self._bends) < _BENDS:
+            return 1.0
+        middle = sorted(self._bends)[_BENDS // 2] / _BEND_BIAS
+        return middle if middle > _SHAKING else 1.0
 
     def interrupt(self) -> None:
         """Samples were left out: the next differences would span the gap."""
         self._means.clear()
+        self._bends.clear()
 
     def _learn_white(self, square: Array, seconds: float) -> None:
         floor = self._settings.noise_floor_g**2
