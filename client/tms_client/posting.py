@@ -57,9 +57,13 @@ class Poster:
         def pause(seconds: float) -> None:
             self._stop.wait(max(0.0, min(seconds, deadline - time.monotonic())))
 
-        with self._one_at_a_time:
+        if not self._one_at_a_time.acquire(timeout=timeout_s):
+            return False  # the thread is at it all the time, in vain
+        try:
             flow = self._delivery.drain(lambda: time.monotonic() < deadline)
             return Connection(self._connection.http, pause).run(flow)
+        finally:
+            self._one_at_a_time.release()
 
     def __enter__(self) -> Poster:
         self._thread = threading.Thread(target=self._run, name=f"poster of {self.spool.agent}", daemon=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+import threading
 from datetime import UTC, datetime
 
 import pytest
@@ -148,3 +149,13 @@ async def test_no_server_no_loss(tmp_path, fake):
         async with AsyncTown(fake.url) as town:
             assert await town.poster(spool, "r").drain()
     assert tags(fake.received("a")) == ["A"]
+
+
+def test_a_drain_ends_in_time_while_the_thread_keeps_trying(tmp_path):
+    with Spool(tmp_path / "s", "a") as spool, Town("http://127.0.0.1:9") as town, town.poster(spool, "r") as poster:
+        poster.post(read("A"))
+        answers: list[bool] = []
+        asking = threading.Thread(target=lambda: answers.append(poster.drain(0.2)), daemon=True)
+        asking.start()
+        asking.join(20)
+        assert answers == [False] and len(spool) == 1
