@@ -54,7 +54,7 @@ class Posted:
 
 
 class Devices:
-    """The states of an agent's devices in one: the worst of them, and what each of that kind says."""
+    """The states of an agent's devices in one: the worst of them, and what each says that is not well."""
 
     def __init__(self) -> None:
         self._states: dict[str, DeviceState] = {}
@@ -71,7 +71,10 @@ class Devices:
         if not self._states:
             return None
         worst = max((one.state for one in self._states.values()), key=_WORST.index)
-        return DeviceState(worst, "; ".join(one.why for one in self._states.values() if one.state == worst)[:_MAX_WHY])
+        # Beside a faulty device a silent one is named, too.
+        named = [one for one in self._states.values() if one.state == worst]
+        named += [one for one in self._states.values() if one.state not in (worst, "connected")]
+        return DeviceState(worst, "; ".join(one.why for one in named)[:_MAX_WHY])
 
 
 class Running:
