@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.llrp.emulator import LlrpEmulator
 from tms_agents.devices.tags import RoundEnd
+from tms_agents.devices.text_reader_emulator import TextReaderDevice
 from tms_agents.devices.thingmagic.emulator import ThingMagicDevice
 from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_agents.devices.transport import DeviceState
@@ -55,6 +56,18 @@ async def test_thingmagic():
     async with PtyLine(device) as line:
         found = await first_read({"kind": "thingmagic", "device": line.path, "read_ms": 20, "poll_s": 0.05})
     assert found == (["connected"], EPC, True)
+
+
+async def test_a_reader_that_prints():
+    device = TextReaderDevice()
+    device.tags.append(UID)
+    async with PtyLine(device, tick_s=0.02) as line:
+        assert await first_read({"kind": "text-serial", "device": line.path}) == (["connected"], UID, False)
+    device = TextReaderDevice("rdm6300")
+    device.tags.append("0A1B2C3D4E")
+    async with TcpLine(device, tick_s=0.02) as line:
+        section = {"kind": "text-tcp", "host": line.host, "port": line.port, "form": "rdm6300"}
+        assert await first_read(section) == (["connected"], "0A1B2C3D4E", False)
 
 
 async def test_llrp():

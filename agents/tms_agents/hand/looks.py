@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+#: Reads that wait for the end of their round for longer than this are a look of their own: some readers tell only the
+#: rounds that found nothing.
+_LONGEST_ROUND_S = 1.0
+
 
 class Looks:
     """Pure. A reader that does not deliver has no looks: then nothing can be said of tags that are not read."""
@@ -15,7 +19,7 @@ class Looks:
 
     def read(self, t: float, tag: str) -> None:
         self.alive = True
-        if not self._rounds and not self._seen:
+        if not self._seen:
             self._since = t
         self._seen.add(tag)
 
@@ -26,7 +30,9 @@ class Looks:
 
     def ended(self, t: float) -> frozenset[str] | None:
         """What a span of time has shown, when it is over. A pause in our work is one look, not many."""
-        if self._rounds or not self.alive or t - self._since < self._look_s:
+        if not self.alive or (self._rounds and not self._seen):
+            return None
+        if t - self._since < (_LONGEST_ROUND_S if self._rounds else self._look_s):
             return None
         return self._take(t)
 

@@ -7,6 +7,7 @@ one message come in the order of one instant: body, then hands.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -32,7 +33,7 @@ from tms_schemas.observation import (
 
 #: Two hands nearer than this may hold the same thing; further apart than the second they hold two.
 _TOGETHER_M, _APART_M = 0.3, 0.6
-_MAX_TAG = 64
+_TAG = re.compile("[A-Z0-9._:-]{1,64}")
 #: Readers and robot deliver out of order by less than this; more is a clock that was set.
 _CLOCK_STEP_S = 2.0
 #: The body is told again after moving or turning this much, and not sooner than this.
@@ -99,8 +100,8 @@ class Robot:
         return found + self._part(at)
 
     def read(self, hand: str, at: datetime, tag: str) -> list[Observation]:
-        """The reader at a hand reads a tag; one too long for the wire is none."""
-        if len(tag) > _MAX_TAG:
+        """The reader at a hand reads a tag; what the wire cannot carry is none."""
+        if not _TAG.fullmatch(tag):
             return []
         return self._tell(hand, at, self._hands[hand].grasp.read(self._seconds(at), tag))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import sys
 from collections import deque
@@ -54,8 +55,9 @@ async def open_states(
 ) -> AsyncGenerator[Sequence[StateMessage] | DeviceState, None]:
     """Messages in groups, and the state of this input like that of any device: for ever, through every failure."""
     link = Link(_opener(source), StateLines, name=_name(source), silent_after_s=silent_after_s, tick_s=0.1)
-    async for item in link.listen():
-        yield item
+    async with contextlib.aclosing(link.listen()) as items:
+        async for item in items:
+            yield item
 
 
 def _opener(source: StateSource) -> Opener:

@@ -69,6 +69,29 @@ class ThingMagicSource(Section):
     poll_s: Seconds = 0.5
 
 
+class _Text(Section):
+    #: ``lines`` end with the hex digits of a tag; ``rdm6300`` frames are those of 125 kHz modules.
+    form: Literal["lines", "rdm6300"] = "lines"
+    #: Some readers print the UID with its bytes reversed.
+    order: Literal["as printed", "reversed"] = "as printed"
+
+
+class TextSerialSource(_Text):
+    """A reader that prints what it reads, on a serial line or USB."""
+
+    kind: Literal["text-serial"]
+    device: str
+    baud: Annotated[int, Field(ge=300, le=4_000_000)] = 9600
+
+
+class TextTcpSource(_Text):
+    """A reader that prints what it reads, on the network or behind a serial server."""
+
+    kind: Literal["text-tcp"]
+    host: str
+    port: Port
+
+
 class CaptureSource(Section):
     """Raw bytes of a reader in a file; an LLRP capture may hold both directions of the conversation."""
 
@@ -82,5 +105,6 @@ class CaptureSource(Section):
 
 
 ReaderSource = Annotated[
-    LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource | CaptureSource, Field(discriminator="kind")
+    LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource | TextSerialSource | TextTcpSource | CaptureSource,
+    Field(discriminator="kind"),
 ]

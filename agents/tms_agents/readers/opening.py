@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from datetime import UTC, datetime
 
 from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.tags import Field, RoundEnd, TagItem, TagRead
+from tms_agents.devices.text_reader import TextReaderSession
 from tms_agents.devices.thingmagic.session import ThingMagicSession
 from tms_agents.devices.tr3.session import Tr3Session
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
@@ -17,6 +19,8 @@ from tms_agents.readers.config import (
     CaptureSource,
     LlrpSource,
     ReaderSource,
+    TextSerialSource,
+    TextTcpSource,
     ThingMagicSource,
     Tr3SerialSource,
     Tr3TcpSource,
@@ -55,12 +59,13 @@ async def open_reader(
             yield at, found if isinstance(found, DeviceState) else [_seen(read, at, own_clock=True) for read in found]
         return
     own_clock = isinstance(source, LlrpSource) and source.reader_clock
-    async for item in _link(source, silent_after_s, field).listen():
-        at = datetime.fromtimestamp(clock(), UTC)
-        if isinstance(item, DeviceState):
-            yield at, item
-        else:
-            yield at, [one if isinstance(one, RoundEnd) else _seen(one, at, own_clock) for one in item]
+    async with contextlib.aclosing(_link(source, silent_after_s, field).listen()) as items:
+        async for item in items:
+            at = datetime.fromtimestamp(clock(), UTC)
+            if isinstance(item, DeviceState):
+                yield at, item
+            else:
+                yield at, [one if isinstance(one, RoundEnd) else _seen(one, at, own_clock) for one in item]
 
 
 def can_pause(source: ReaderSource) -> bool:
@@ -78,9 +83,10 @@ def tells_rounds(source: ReaderSource) -> bool:
     return isinstance(source, Tr3SerialSource | Tr3TcpSource) and source.mode == "inventory"
 
 
-def _link(
-    source: LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource, silent_after_s: float, field: Field | None
-) -> Link[TagItem]:
+_Device = LlrpSource | Tr3SerialSource | Tr3TcpSource | ThingMagicSource | TextSerialSource | TextTcpSource
+
+
+def _link(source: _Device, silent_after_s: float, field: Field | None) -> Link[TagItem]:
     if isinstance(source, LlrpSource):
         return Link(
             tcp(source.host, source.port),
@@ -99,10 +105,13 @@ def _link(
             silent_after_s=silent_after_s,
             tick_s=min(0.05, source.poll_s / 2),
         )
-    if isinstance(source, Tr3SerialSource):
-        opener, name = serial(source.device, source.baud), f"TR3 {source.device}"
+    kind = "text reader" if isinstance(source, TextSerialSource | TextTcpSource) else "TR3"
+    if isinstance(source, Tr3SerialSource | TextSerialSource):
+        opener, name = serial(source.device, source.baud), f"{kind} {source.device}"
     else:
-        opener, name = tcp(source.host, source.port), f"TR3 {source.host}:{source.port}"
+        opener, name = tcp(source.host, source.port), f"{kind} {source.host}:{source.port}"
+    if isinstance(source, TextSerialSource | TextTcpSource):
+        return Link(opener, lambda: TextReaderSession(form=source.form, order=source.order), name=name)
     return Link(
         opener,
         lambda: Tr3Session(

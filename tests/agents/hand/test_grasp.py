@@ -77,6 +77,14 @@ def test_a_reader_without_rounds_is_cut_into_looks():
     assert taken(rounds=False).told() == taken().told()
 
 
+def test_a_reader_that_tells_only_rounds_without_a_tag():
+    """ThingMagic in single mode: while a tag is read no round ends."""
+    play = Play(rounds=False)
+    play.events += play.hand.round_end(play.t)
+    play.stay(1, TEA).fingers(AROUND).stay(2, TEA).go(1.5, 5, TEA)
+    assert [one.tag for one in play.told()] == [TEA]
+
+
 def test_one_missed_read_is_nothing_and_neither_are_many_while_the_fingers_hold_it():
     play = taken()
     for _ in range(20):

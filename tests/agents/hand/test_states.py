@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import sys
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.devices.transport import DeviceFault, DeviceState
-from tms_agents.hand.state_sources import TcpStates, UdpStates, UnixStates, open_states
+from tms_agents.hand.state_sources import StdinStates, TcpStates, UdpStates, UnixStates, open_states
 from tms_agents.hand.states import StateLines, StateMessage
 
 GOOD = {"t": 1.5, "joints": {"a": 0.1}, "base": [1, 2, 3], "gripper": {"left": {"closed": True, "opening_m": 0.03}}}
@@ -122,3 +124,14 @@ async def test_datagrams_with_and_without_newline(unused_udp_port):
         await asyncio.sleep(0.02)
     transport.close()
     assert len(task.result()) >= 3
+
+
+async def test_standard_input_is_a_pipe(monkeypatch):
+    read_end, write_end = os.pipe()
+    with os.fdopen(read_end, "rb", 0) as standard_input, os.fdopen(write_end, "wb", 0) as robot:
+        monkeypatch.setattr(sys, "stdin", standard_input)
+        robot.write(line() * 2)
+        assert len(await heard(StdinStates(kind="stdin"), 2)) == 2
+        robot.write(line())  # it can be opened again
+        assert len(await heard(StdinStates(kind="stdin"), 1)) == 1
+        await asyncio.sleep(0)
