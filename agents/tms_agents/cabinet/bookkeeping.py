@@ -59,7 +59,7 @@ class Bookkeeper:
         events: list[CabinetEvent] = []
         settling, self.settling = self.settling, None
         if explanation.undo is not None:
-            events += self._undo(step.now, explanation.undo)
+            events += self._undo(step.now, explanation.undo, explanation.removed)
         gone, gone_variance = np.zeros_like(step.change), np.zeros_like(step.change)
         for thing in explanation.removed:
             events.append(self._remove(thing, step, alone=explanation.kind == "take" and len(explanation.removed) == 1))
@@ -89,11 +89,12 @@ class Bookkeeper:
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events
 
-    def _undo(self, now: float, doubt: Doubt) -> list[CabinetEvent]:
+    def _undo(self, now: float, doubt: Doubt, gone: Sequence[Thing]) -> list[CabinetEvent]:
         self.doubts.remove(doubt)
         doubt.thing.load = doubt.thing.load - doubt.change
         doubt.other.load = doubt.other.load + doubt.change
-        return [*self._tell(doubt.thing, now, always=True), *self._tell(doubt.other, now, always=True)]
+        stays = [thing for thing in (doubt.thing, doubt.other) if thing not in gone]
+        return [event for thing in stays for event in self._tell(thing, now, always=True)]
 
     def _put_two(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         events: list[CabinetEvent] = []

@@ -143,12 +143,13 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
                 found.append(Explanation("adjust", prior + put.same_place(thing, step), thing=thing, load=left))
     found += _taken_and_pressed(step, found, things, put)
     for doubt in evidence.doubts:
-        for thing, sign in ((doubt.thing, -1.0), (doubt.other, 1.0)):
-            if doubt.thing.id in shelf.things and doubt.other.id in shelf.things:
-                noise = variance + thing.at(step.now, settings.creep_per_hour) + step.variance
-                score = math.log(_PRIOR["take"]) + each + evidence.taken(thing) + doubt.odds
-                score += normal(change + thing.load + sign * doubt.change, noise)
-                found.append(Explanation("take", score, removed=(thing,), undo=doubt))
+        for which, sign in ((doubt.thing, -1.0), (doubt.other, 1.0)):
+            if doubt.thing.id not in shelf.things or doubt.other.id not in shelf.things:
+                continue
+            noise = variance + which.at(step.now, settings.creep_per_hour) + step.variance
+            score = math.log(_PRIOR["take"]) + each + evidence.taken(which) + doubt.odds
+            score += normal(change + which.load + sign * doubt.change, noise)
+            found.append(Explanation("take", score, removed=(which,), undo=doubt))
     found += _two_taken(step, things, noises, taken)
     if step.weight_g > 2 * settings.min_weight_g:
         found += _two_put(step, put, evidence.loose)
