@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 from tms_agents.devices.tags import RoundEnd, TagItem, TagRead
 
@@ -44,3 +44,30 @@ def rounds(items: list[TagItem]) -> list[tuple[int, set[str]]]:
             assert isinstance(item, RoundEnd)
             found.append((item.antenna, seen.pop(item.antenna, set())))
     return found
+
+
+def assert_true(items: list[TagItem], truth: Mapping[int, set[str]]) -> None:
+    """Nothing is read that is not there, and a round that ended has read everything there is."""
+    assert all(isinstance(item, RoundEnd) or item.tag in truth[item.antenna] for item in items)
+    assert all(tags == truth[antenna] for antenna, tags in rounds(items))
+
+
+class DisturbedLine:
+    """Harms answers on their way: (number of the answer, place in it, "flip", "drop" or "insert", value)."""
+
+    def __init__(self, harm: Sequence[tuple[int, int, str, int]]) -> None:
+        self._harm, self._answers = harm, 0
+
+    def __call__(self, answer: bytes) -> bytes:
+        raw = bytearray(answer)
+        for number, at, what, value in self._harm:
+            if number == self._answers and raw:
+                place = at % len(raw)
+                if what == "flip":
+                    raw[place] ^= value
+                elif what == "drop":
+                    del raw[place]
+                else:
+                    raw.insert(place, value)
+        self._answers += 1
+        return bytes(raw)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import random
 import threading
 import time
 
 import pytest
+from link_listening import QUICK, on_a_line, states, until
 
-from tms_agents.devices.emulation import PtyLine, TcpLine
+from tms_agents.devices.emulation import PtyLine
 from tms_agents.devices.llrp.emulator import LlrpEmulator
 from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.tags import RoundEnd, TagItem, TagRead
@@ -18,9 +17,7 @@ from tms_agents.devices.tr3.codec import Frame
 from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_agents.devices.tr3.session import Tr3Session
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
-from tms_client import Retry
 
-QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
 EPC = "30352B2E4401D3000000007B"
 UID = "E00401004E17F97A"
 
@@ -35,32 +32,14 @@ def tr3(opener, **options) -> Link[TagItem]:
     return Link(opener, lambda: Tr3Session(poll_s=0.02, reply_s=0.1), name="tr3", **options)
 
 
-async def until(link: Link[TagItem], wanted, act=None, timeout_s: float = 8.0) -> list[TagItem | DeviceState]:
-    """Listen until an item satisfies ``wanted``; all items so far. ``act`` is called after each item."""
-    seen: list[TagItem | DeviceState] = []
-    async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
-        async for arrived in items:
-            for item in [arrived] if isinstance(arrived, DeviceState) else arrived:
-                seen.append(item)
-                if wanted(item, seen):
-                    return seen
-                if act:
-                    act(item)
-    raise AssertionError("the link ended")
-
-
-def is_read(item, seen) -> bool:
-    return isinstance(item, TagRead)
-
-
-def states(seen) -> list[str]:
-    return [item.state for item in seen if isinstance(item, DeviceState)]
+def is_read(seen) -> bool:
+    return isinstance(seen[-1], TagRead)
 
 
 async def test_llrp_reports_tags_and_is_kept_alive():
     async with LlrpEmulator(period_s=0.02) as reader:
         reader.see(EPC, antenna=3, rssi_dbm=-61)
-        seen = await until(llrp(reader.port), lambda item, seen: reader.acknowledged >= 2)
+        seen = await until(llrp(reader.port), lambda seen: reader.acknowledged >= 2)
         read = next(item for item in seen if isinstance(item, TagRead))
         assert (read.tag, read.antenna, read.rssi_dbm) == (EPC, 3, -61.0) and read.first_seen is not None
         assert states(seen) == ["connected"]
@@ -78,9 +57,7 @@ async def test_llrp_garbage_and_a_cut_cable():
                 reader.inject(b"\xff\xfe garbage \xff")
                 reader.hang_up()
 
-        seen = await until(
-            llrp(reader.port), lambda item, seen: is_read(item, seen) and "faulty" in states(seen), disturb
-        )
+        seen = await until(llrp(reader.port), lambda seen: is_read(seen) and "faulty" in states(seen), disturb)
         assert states(seen) == ["connected", "faulty", "connected"]
 
 
@@ -91,8 +68,8 @@ async def test_llrp_reader_falls_silent_and_comes_back():
         def hush(item):
             reader.silent = isinstance(item, TagRead)
 
-        def back(item, seen):
-            return isinstance(item, TagRead) and "silent" in states(seen)
+        def back(seen):
+            return is_read(seen) and "silent" in states(seen)
 
         seen = await until(llrp(reader.port, silent_after_s=0.2), back, hush)
         assert states(seen)[:2] == ["connected", "silent"] and states(seen)[-1] == "connected"
@@ -101,18 +78,18 @@ async def test_llrp_reader_falls_silent_and_comes_back():
 async def test_llrp_second_client_and_refused_commands_say_why():
     async with LlrpEmulator(period_s=0.02) as reader:
         reader.refuse = 2
-        (state,) = await until(llrp(reader.port), lambda item, seen: True)
+        (state,) = await until(llrp(reader.port), lambda seen: True)
         assert state == DeviceState(
             "faulty", "reader: the reader refuses the connection: another client is connected already"
         )
         reader.refuse = 0
         reader.fail = {"ADD_ROSPEC"}
-        (state,) = await until(llrp(reader.port), lambda item, seen: True)
+        (state,) = await until(llrp(reader.port), lambda seen: True)
         assert state.why == "reader: ADD_ROSPEC_RESPONSE: status 101 ADD_ROSPEC fails"
 
 
 async def test_nobody_listens():
-    (state,) = await until(llrp(9), lambda item, seen: True)
+    (state,) = await until(llrp(9), lambda seen: True)
     assert state.state == "faulty" and "Connect call failed" in state.why
 
 
@@ -147,11 +124,9 @@ async def test_tr3_polls_its_antennas(line):
     device = Tr3Device()
     device.see(UID, antenna=0)
     device.see("E00401508747FFC8", antenna=1)
-    place = PtyLine(device) if line == "pty" else TcpLine(device)
-    async with place:
-        opener = serial(place.path, 38400) if line == "pty" else tcp("127.0.0.1", place.port)
+    async with on_a_line(line, device, 38400) as (_, opener):
         link = Link(opener, lambda: Tr3Session(antennas=(0, 1), poll_s=0.02), name="tr3", tick_s=0.01, retry=QUICK)
-        seen = await until(link, lambda item, seen: len(seen) == 7)
+        seen = await until(link, lambda seen: len(seen) == 7)
         reads = {(item.tag, item.antenna) for item in seen if isinstance(item, TagRead)}
         assert reads == {(UID, 0), ("E00401508747FFC8", 1)}
         assert states(seen) == ["connected"]
@@ -164,7 +139,7 @@ async def test_tr3_one_antenna_is_read_again_and_again():
     device = Tr3Device()
     device.see(UID)
     async with PtyLine(device) as line:
-        seen = await until(tr3(serial(line.path, 38400)), lambda item, seen: seen.count(RoundEnd(0)) == 4)
+        seen = await until(tr3(serial(line.path, 38400)), lambda seen: seen.count(RoundEnd(0)) == 4)
         assert [item.tag for item in seen if isinstance(item, TagRead)] == [UID] * 4
 
 
@@ -187,9 +162,7 @@ async def test_tr3_garbage_silence_and_nack():
             if reads == 6 and isinstance(item, TagRead):
                 device.nack_next = 5
 
-        seen = await until(
-            link, lambda item, seen: reads >= 7 and "faulty" in states(seen) and is_read(item, seen), disturb
-        )
+        seen = await until(link, lambda seen: reads >= 7 and "faulty" in states(seen) and is_read(seen), disturb)
         assert states(seen) == ["connected", "silent", "connected", "faulty", "connected"]
         why = next(item.why for item in seen if isinstance(item, DeviceState) and item.state == "faulty")
         assert why == "tr3: the reader refuses command 02 00 78 03 F0 40 01 03 B1 0D: format error"
@@ -214,5 +187,5 @@ async def test_tr3_rdloop_is_listened_to():
 
 
 async def test_no_such_serial_port(tmp_path):
-    (state,) = await until(tr3(serial(str(tmp_path / "tty"), 38400)), lambda item, seen: True)
+    (state,) = await until(tr3(serial(str(tmp_path / "tty"), 38400)), lambda seen: True)
     assert state.state == "faulty" and "No such file" in state.why

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import random
 import threading
 
 import pytest
 from device_conversation import rounds
+from link_listening import QUICK, states
 
 from tms_agents.devices.llrp import messages
 from tms_agents.devices.llrp.codec import FrameParser, Message, Parameter, encode
@@ -16,10 +16,8 @@ from tms_agents.devices.llrp.emulator import LlrpEmulator
 from tms_agents.devices.llrp.session import LlrpSession
 from tms_agents.devices.tags import RoundEnd, TagItem, TagRead
 from tms_agents.devices.transport import DeviceState, Link, tcp
-from tms_client import Retry
 
 EPCS = ("30352B2E4401D3000000007B", "E200322FE20DF9311328B7E3", "3074257BF7194E4000001A85")
-QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
 
 
 def link(port: int, antennas=(1, 2, 3)) -> Link[TagItem]:
@@ -120,8 +118,7 @@ async def test_a_power_cycle_in_the_middle_of_a_message():
 
         seen = await listen(link(reader.port), 12, cycle)
         assert len(cycles) == 3
-        states = [item.state for item in seen if isinstance(item, DeviceState)]
-        assert states == ["connected", *["faulty", "connected"] * 3]
+        assert states(seen) == ["connected", *["faulty", "connected"] * 3]
         assert all(tags == ({EPCS[0]} if antenna == 1 else set()) for antenna, tags in rounds(items(seen)))
 
 

@@ -8,21 +8,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import random
 from dataclasses import dataclass, field
 
 import pytest
 from device_conversation import rounds
+from link_listening import QUICK, on_a_line
 
-from tms_agents.devices.emulation import PtyLine, TcpLine
+from tms_agents.devices.emulation import PtyLine
 from tms_agents.devices.tags import RoundEnd, TagItem
 from tms_agents.devices.thingmagic import messages as m
 from tms_agents.devices.thingmagic.emulator import ThingMagicDevice
 from tms_agents.devices.thingmagic.session import ThingMagicSession
 from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_agents.devices.tr3.session import Tr3Session
-from tms_agents.devices.transport import DeviceState, Link, serial, tcp
-from tms_client import Retry
+from tms_agents.devices.transport import DeviceState, Link
 
 TAG = "E00401004E17F97A"
 SILENT_AFTER_S = 0.35
@@ -89,11 +88,8 @@ async def at_work(request):
     reader, kind = request.param.split()
     make = {"tr3": tr3, "thingmagic": thingmagic}[reader]
     device, (first, second), session = make()
-    line = PtyLine(device) if kind == "pty" else TcpLine(device)
-    async with line:
-        opener = serial(line.path, 38400) if kind == "pty" else tcp("127.0.0.1", line.port)
-        retry = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
-        link = Link(opener, session, name="reader", silent_after_s=SILENT_AFTER_S, tick_s=0.01, retry=retry)
+    async with on_a_line(kind, device, 38400) as (line, opener):
+        link = Link(opener, session, name="reader", silent_after_s=SILENT_AFTER_S, tick_s=0.01, retry=QUICK)
         async with Listener(link) as listener:
             await listener.more_rounds()
             yield device, line, listener

@@ -8,11 +8,11 @@ import contextlib
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from link_listening import on_a_line
 
-from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.scanner import Misread, Scan, ScannerSession, check_digit, decode, product_code
 from tms_agents.devices.scanner_emulator import ScannerDevice
-from tms_agents.devices.transport import DeviceState, Link, serial, tcp
+from tms_agents.devices.transport import DeviceState, Link
 
 JAN = "4901777018686"
 codes = st.sampled_from([7, 11, 12]).flatmap(
@@ -113,8 +113,7 @@ def test_half_a_line_is_dropped_when_it_goes_no_further():
 async def test_a_cable_pulled_in_the_middle_of_a_code(kind):
     """Connected though nobody scans; then half a code, no cable, a cable, a code: one scan."""
     device = ScannerDevice(aim=True)
-    async with PtyLine(device) if kind == "pty" else TcpLine(device) as line:
-        opener = serial(line.path, 9600) if kind == "pty" else tcp("127.0.0.1", line.port)
+    async with on_a_line(kind, device) as (line, opener):
         seen: list[Scan | Misread | DeviceState] = []
         link = Link(opener, ScannerSession, name="scanner", silent_after_s=0.2, tick_s=0.02)
         async with asyncio.timeout(10), contextlib.aclosing(link.listen()) as groups:

@@ -8,12 +8,12 @@ import contextlib
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from link_listening import on_a_line
 
-from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.tags import TagRead
 from tms_agents.devices.text_reader import Rdm6300Parser, TextReaderSession, tag_of_line
 from tms_agents.devices.text_reader_emulator import TextReaderDevice
-from tms_agents.devices.transport import DeviceState, Link, serial, tcp
+from tms_agents.devices.transport import DeviceState, Link
 
 UID = "E00401004E17F97A"
 
@@ -93,8 +93,7 @@ def test_half_a_tag_is_dropped_when_it_goes_no_further(form):
 async def test_a_cable_pulled_in_the_middle_of_a_tag(kind, form):
     device = TextReaderDevice(form)
     device.tags = ["0123456789" if form == "rdm6300" else UID]
-    async with PtyLine(device, tick_s=0.02) if kind == "pty" else TcpLine(device, tick_s=0.02) as line:
-        opener = serial(line.path, 9600) if kind == "pty" else tcp("127.0.0.1", line.port)
+    async with on_a_line(kind, device, tick_s=0.02) as (line, opener):
         seen: list[TagRead | DeviceState] = []
         link = Link(opener, lambda: TextReaderSession(form=form), name="reader", tick_s=0.02)
         async with asyncio.timeout(10), contextlib.aclosing(link.listen()) as groups:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from device_conversation import Clock, converse, rounds
+from device_conversation import Clock, DisturbedLine, assert_true, converse, rounds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -176,12 +176,6 @@ def test_weighing_pauses_reading():
     assert rounds(converse(host, device, clock, 0.1)) == [(1, TRUTH[1])]
 
 
-def assert_true(items) -> None:
-    """Nothing is read that is not there, and a round that ended has read everything there is."""
-    assert all(isinstance(item, RoundEnd) or item.tag in TRUTH[item.antenna] for item in items)
-    assert all(tags == TRUTH[antenna] for antenna, tags in rounds(items))
-
-
 @pytest.mark.parametrize("boots_itself", [False, True])
 def test_a_power_cycle_after_any_byte_costs_some_cycles_and_tells_nothing_wrong(boots_itself):
     for cut in range(0, 900, 7):
@@ -191,7 +185,7 @@ def test_a_power_cycle_after_any_byte_costs_some_cycles_and_tells_nothing_wrong(
         device.power_cycle_after = cut
         items = converse(host, device, clock, 1.5, step_s=0.05)
         assert device.power_cycles == 1
-        assert_true(items)
+        assert_true(items, TRUTH)
         assert len(rounds(items)) >= 10, cut
 
 
@@ -205,19 +199,5 @@ def test_a_power_cycle_after_any_byte_costs_some_cycles_and_tells_nothing_wrong(
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm):
     clock, device = Clock(), full_reader()
     host = session(clock, antennas=(1, 2, 3))
-    answers = 0
-
-    def line(answer: bytes) -> bytes:
-        nonlocal answers
-        raw = bytearray(answer)
-        for number, at, what, value in harm:
-            if number == answers and raw:
-                if what == "flip":
-                    raw[at % len(raw)] ^= value
-                else:
-                    del raw[at % len(raw)]
-        answers += 1
-        return bytes(raw)
-
-    assert_true(converse(host, device, clock, 5.0, step_s=0.05, line=line))
+    assert_true(converse(host, device, clock, 5.0, step_s=0.05, line=DisturbedLine(harm)), TRUTH)
     assert rounds(converse(host, device, clock, 0.5, step_s=0.05))

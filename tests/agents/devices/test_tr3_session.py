@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from device_conversation import Clock, converse, rounds
+from device_conversation import Clock, DisturbedLine, assert_true, converse, rounds
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -160,13 +160,6 @@ def full_reader() -> Tr3Device:
     return device
 
 
-def assert_true(items) -> None:
-    """Nothing is read that is not there, and a round that ended has read everything there is."""
-    for item in items:
-        assert isinstance(item, RoundEnd) or item.tag in TRUTH[item.antenna]
-    assert all(tags == TRUTH[antenna] for antenna, tags in rounds(items))
-
-
 @pytest.mark.parametrize("antennas", [(0,), (0, 1, 2)])
 def test_a_power_cycle_after_any_byte_costs_some_cycles_and_tells_nothing_wrong(antennas):
     for cut in range(160):
@@ -175,7 +168,7 @@ def test_a_power_cycle_after_any_byte_costs_some_cycles_and_tells_nothing_wrong(
         device.power_cycle_after = cut
         items = converse(host, device, clock, 1.5)
         assert device.power_cycles == 1
-        assert_true(items)
+        assert_true(items, TRUTH)
         assert len(rounds(items)) >= 8 * len(antennas), cut
 
 
@@ -191,23 +184,6 @@ damage = st.lists(
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm, antennas, rests):
     clock, device = Clock(), full_reader()
     host = session(clock, antennas=antennas, rf_off_between_rounds=rests)
-    answers = 0
-
-    def line(answer: bytes) -> bytes:
-        nonlocal answers
-        raw = bytearray(answer)
-        for number, at, what, value in harm:
-            if number == answers and raw:
-                place = at % len(raw)
-                if what == "flip":
-                    raw[place] ^= value
-                elif what == "drop":
-                    del raw[place]
-                else:
-                    raw.insert(place, value)
-        answers += 1
-        return bytes(raw)
-
-    items = converse(host, device, clock, 6.0, step_s=0.05, line=line)
-    assert_true(items)
+    items = converse(host, device, clock, 6.0, step_s=0.05, line=DisturbedLine(harm))
+    assert_true(items, TRUTH)
     assert rounds(converse(host, device, clock, 1.0))

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
-import random
 
 import pytest
+from link_listening import QUICK, on_a_line, samples, states, until
 
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.loadboard import RosTmsBoardSession
 from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
-from tms_client import Retry
-
-QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
 
 
 def board(opener, **options) -> Link[LoadSample]:
@@ -24,32 +20,10 @@ def board(opener, **options) -> Link[LoadSample]:
     return Link(opener, RosTmsBoardSession, name="board", **options)
 
 
-async def until(link, wanted, act=None, timeout_s: float = 8.0):
-    seen = []
-    async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
-        async for arrived in items:
-            for item in [arrived] if isinstance(arrived, DeviceState) else arrived:
-                seen.append(item)
-                if wanted(seen):
-                    return seen
-                if act:
-                    act(item)
-    raise AssertionError("the link ended")
-
-
-def samples(seen):
-    return [item for item in seen if isinstance(item, LoadSample)]
-
-
-def states(seen):
-    return [item.state for item in seen if isinstance(item, DeviceState)]
-
-
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
 async def test_counts_come_over_a_line(kind):
     device = RosTmsBoardDevice(lambda t: [10, -20, 30.4, 123456])
-    async with PtyLine(device) if kind == "pty" else TcpLine(device) as line:
-        opener = serial(line.path, 115200) if kind == "pty" else tcp("127.0.0.1", line.port)
+    async with on_a_line(kind, device, 115200) as (_, opener):
         seen = await until(board(opener), lambda seen: len(samples(seen)) == 5)
         assert states(seen) == ["connected"]
         assert {sample.values for sample in samples(seen)} == {(10.0, -20.0, 30.0, 123456.0)}

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import random
 import sys
 
 import minimalmodbus
 import pytest
+from link_listening import QUICK, samples, states, until
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
@@ -25,10 +25,8 @@ from tms_agents.devices.modbus import (
 )
 from tms_agents.devices.modbus.emulator import ModbusRtuLine, ModbusTcpPort, WeighingModule
 from tms_agents.devices.transport import DeviceState
-from tms_client import Retry
 from tms_client.cli import CommandError
 
-QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
 #: Four cells in two places, negative numbers, tenths of a gram.
 CELLS = WeighingMap(
     cells=(100, 102, 200, 202),
@@ -43,27 +41,6 @@ GRAMS = (10.5, -20.0, 3000.1, 0.0)
 def module_link(opener, registers=CELLS, **options) -> ModbusLink:
     options = {"period_s": 0.02, "reply_s": 0.1, "silent_after_s": 0.3, "retry": QUICK, **options}
     return ModbusLink(opener, registers, name="module", **options)
-
-
-async def until(link, wanted, act=None, timeout_s: float = 8.0):
-    seen = []
-    async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
-        async for arrived in items:
-            for item in [arrived] if isinstance(arrived, DeviceState) else arrived:
-                seen.append(item)
-                if wanted(seen):
-                    return seen
-                if act:
-                    await act(item)
-    raise AssertionError("the link ended")
-
-
-def samples(seen):
-    return [item for item in seen if isinstance(item, LoadSample)]
-
-
-def states(seen):
-    return [item.state for item in seen if isinstance(item, DeviceState)]
 
 
 @contextlib.asynccontextmanager

@@ -5,18 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import random
 
 import pytest
+from link_listening import QUICK, on_a_line, samples, states, until
 
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.scales import DIALECTS, LoadGroup, ScaleLineSession
 from tms_agents.devices.scales.emulator import AndScale, OpenScale, SicsScale
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
-from tms_client import Retry
 
-QUICK = Retry(first_s=0.02, cap_s=0.05, random=random.Random(1))
 SCALES = {"openscale": OpenScale, "and": AndScale, "mt-sics": SicsScale}
 
 
@@ -26,27 +24,6 @@ def scale(opener, dialect, link=None, **options) -> Link[LoadSample]:
     return Link(opener, lambda: ScaleLineSession(dialect, **options), name="scale", **link)
 
 
-async def until(link, wanted, act=None, timeout_s: float = 8.0):
-    seen = []
-    async with asyncio.timeout(timeout_s), contextlib.aclosing(link.listen()) as items:
-        async for arrived in items:
-            for item in [arrived] if isinstance(arrived, DeviceState) else arrived:
-                seen.append(item)
-                if wanted(seen):
-                    return seen
-                if act:
-                    act(item)
-    raise AssertionError("the link ended")
-
-
-def samples(seen):
-    return [item for item in seen if isinstance(item, LoadSample)]
-
-
-def states(seen):
-    return [item.state for item in seen if isinstance(item, DeviceState)]
-
-
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
 @pytest.mark.parametrize("mode", ["poll", "stream"])
 @pytest.mark.parametrize("dialect", sorted(SCALES))
@@ -54,8 +31,7 @@ async def test_weights_come_over_a_line(dialect, mode, kind):
     device = SCALES[dialect](lambda t: 412.3, unit="kg", decimals=4, period_s=0.02)
     if dialect == "openscale" and mode == "poll":
         device.trigger = "!"
-    async with (PtyLine if kind == "pty" else TcpLine)(device, tick_s=0.01) as line:
-        opener = serial(line.path, 9600) if kind == "pty" else tcp("127.0.0.1", line.port)
+    async with on_a_line(kind, device, tick_s=0.01) as (_, opener):
         seen = await until(scale(opener, dialect, mode=mode), lambda seen: len(samples(seen)) == 4)
         assert states(seen) == ["connected"]
         assert [sample.values[0] for sample in samples(seen)] == pytest.approx([412.3] * 4)
