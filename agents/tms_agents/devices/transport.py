@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Literal, Protocol, TypeVar
+from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from tms_client.flows import Retry
 
@@ -47,13 +48,20 @@ class Session(Protocol[T_co]):
         """Take bytes in pieces of any size; returns the readings they complete."""
 
     def tick(self) -> None:
-        """Called several times a second: poll, keep alive."""
+        """Called several times a second, more often where the session is ``Paced``: poll, keep alive."""
 
     def output(self) -> bytes:
         """Bytes to send now; each is given out once."""
 
     def closing(self) -> bytes:
         """What to send before the stream is closed on our side."""
+
+
+@runtime_checkable
+class Paced(Protocol):
+    """A session that has to be ticked every ``tick_s`` seconds to keep its pace."""
+
+    tick_s: float
 
 
 @dataclass(slots=True)
@@ -116,21 +124,14 @@ def serial(device: str, baud: int, *, parity: str = "N", bits: int = 8, stop_bit
     return open_
 
 
-class Link(Generic[T]):
-    """Readings and states of one device, for as long as the caller listens."""
+class DeviceLink(ABC, Generic[T]):
+    """Readings and states of one device, for as long as the caller listens; how it is asked is for subclasses.
 
-    def __init__(
-        self,
-        opener: Opener,
-        session: Callable[[], Session[T]],
-        *,
-        name: str,
-        silent_after_s: float = 10.0,
-        tick_s: float = 0.2,
-        retry: Retry | None = None,
-    ) -> None:
-        self._open, self._session, self._name = opener, session, name
-        self._silent_after_s, self._tick_s = silent_after_s, tick_s
+    Nothing for ``silent_after_s`` seconds is "silent", for three times as long a fault; after a fault it connects anew.
+    """
+
+    def __init__(self, *, name: str, silent_after_s: float, retry: Retry | None) -> None:
+        self._name, self._silent_after_s = name, silent_after_s
         self._retry = retry or Retry(first_s=0.2, cap_s=10.0)
         self._state: DeviceState | None = None
 
@@ -152,29 +153,69 @@ class Link(Generic[T]):
             failures += 1
             await asyncio.sleep(self._retry.pause(failures))
 
+    @abstractmethod
+    def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
+        """One connection to its end; a fault of the device is raised."""
+
+    def _alive(self) -> list[DeviceState]:
+        return self._change("connected", self._name)
+
+    def _silence(self, lasts_s: float) -> list[DeviceState]:
+        """What is to be said of a silence so long. Raises ``DeviceFault`` where it is too long."""
+        if lasts_s > 3 * self._silent_after_s:
+            raise DeviceFault(f"nothing for {3 * self._silent_after_s:g} s")
+        if lasts_s > self._silent_after_s:
+            return self._change("silent", f"{self._name}: nothing for {self._silent_after_s:g} s")
+        return []
+
+    def _change(self, state: Literal["connected", "silent", "faulty"], why: str) -> list[DeviceState]:
+        new = DeviceState(state, why[:500])
+        if new == self._state:
+            return []
+        self._state = new
+        return [new]
+
+
+class Link(DeviceLink[T]):
+    """The link of a ``Session`` over a byte stream.
+
+    It ticks every ``tick_s`` seconds, or as often as the session wants it if that is more often.
+    """
+
+    def __init__(
+        self,
+        opener: Opener,
+        session: Callable[[], Session[T]],
+        *,
+        name: str,
+        silent_after_s: float = 10.0,
+        tick_s: float = 0.2,
+        retry: Retry | None = None,
+    ) -> None:
+        super().__init__(name=name, silent_after_s=silent_after_s, retry=retry)
+        self._open, self._session, self._tick_s = opener, session, tick_s
+
     async def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
         stream = await self._open()
         session = self._session()
+        tick_s = min(self._tick_s, session.tick_s) if isinstance(session, Paced) else self._tick_s
         clock = asyncio.get_running_loop().time
         alive, frames = clock(), 0
         try:
             session.opened()
             stream.write(session.output())
             while True:
-                data = await _within(self._tick_s, stream.read())
+                data = await _within(tick_s, stream.read())
                 if data == b"":
                     return
                 items = session.receive(data) if data else ()
                 if session.frames > frames:
                     alive, frames = clock(), session.frames
-                    if session.ready:
-                        for state in self._change("connected", self._name):
-                            yield state
-                elif clock() - alive > self._silent_after_s:
-                    for state in self._change("silent", f"{self._name}: nothing for {self._silent_after_s:g} s"):
-                        yield state
-                    if clock() - alive > 3 * self._silent_after_s:
-                        raise DeviceFault(f"nothing for {3 * self._silent_after_s:g} s")
+                    states = self._alive() if session.ready else []
+                else:
+                    states = self._silence(clock() - alive)
+                for state in states:
+                    yield state
                 if items:
                     yield items
                 session.tick()
@@ -183,13 +224,6 @@ class Link(Generic[T]):
             with contextlib.suppress(DeviceFault):
                 stream.write(session.closing())
             await stream.close()
-
-    def _change(self, state: Literal["connected", "silent", "faulty"], why: str) -> list[DeviceState]:
-        new = DeviceState(state, why[:500])
-        if new == self._state:
-            return []
-        self._state = new
-        return [new]
 
 
 async def _within(seconds: float, awaitable: Awaitable[bytes]) -> bytes | None:

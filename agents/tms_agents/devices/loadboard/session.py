@@ -40,9 +40,9 @@ _LONGEST_PAUSE_S = 2.0
 class RosTmsBoardSession:
     """Delivers a ``LoadSample`` of counts per round, one round every ``period_s`` seconds if the board is fast enough.
 
-    The link should tick several times a period. ``reply_s``: an answer later than this is missing. A cell that misses
-    three in a row is NaN from then on and asked every ``retry_s``; ``fault`` names it. Only answers count as signs of
-    life, so a board that gives none is silent for the link, and delivers nothing.
+    ``reply_s``: an answer later than this is missing. A cell that misses three in a row is NaN from then on and asked
+    every ``retry_s``; ``fault`` names it. Only answers count as signs of life, so a board that gives none is silent for
+    the link, and delivers nothing.
 
     Raises:
         ValueError: more cells than there are indices, or none.
@@ -62,6 +62,7 @@ class RosTmsBoardSession:
             raise ValueError(f"a board has 1 to {len(INDEX)} cells, not {cells}")
         self.frames = 0
         self.ready = False
+        self.tick_s = period_s / 10  # a round ends only after some looks at a quiet line
         #: Rounds thrown away because an answer came that nobody had asked for.
         self.doubtful_rounds = 0
         self._period_s, self._reply_s, self._late_s, self._retry_s = period_s, reply_s, late_s, retry_s

@@ -7,14 +7,13 @@ opened.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import AsyncGenerator, Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.modbus.registers import WeighingMap
-from tms_agents.devices.transport import DeviceFault, DeviceState
+from tms_agents.devices.transport import DeviceFault, DeviceLink, DeviceState
 from tms_client.cli import CommandError
 from tms_client.flows import Retry
 
@@ -67,11 +66,12 @@ def modbus_rtu(device: str, baud: int = 9600, *, parity: str = "N", bits: int = 
     return open_
 
 
-class ModbusLink:
+class ModbusLink(DeviceLink[LoadSample]):
     """Asks one module every ``period_s`` and delivers a ``LoadSample`` for each complete answer.
 
     After an answer that did not come within ``reply_s`` it waits as long again before it asks anew: a late answer of
-    RTU says not what it answers. A refusal by the module is a fault, with the reason; "busy" is not.
+    RTU says not what it answers. A refusal by the module is a fault, with the reason; "busy" is not. ``listen`` raises
+    ``CommandError`` where pymodbus is not installed.
     """
 
     def __init__(
@@ -85,32 +85,8 @@ class ModbusLink:
         silent_after_s: float = 10.0,
         retry: Retry | None = None,
     ) -> None:
-        self._open, self._map, self._name = opener, registers, name
-        self._period_s, self._reply_s, self._silent_after_s = period_s, reply_s, silent_after_s
-        self._retry = retry or Retry(first_s=0.2, cap_s=10.0)
-        self._state: DeviceState | None = None
-
-    async def listen(self) -> AsyncGenerator[Sequence[LoadSample] | DeviceState, None]:
-        """Samples one at a time, and the state whenever it changes.
-
-        Raises:
-            CommandError: pymodbus is not installed.
-        """
-        failures = 0
-        while True:
-            try:
-                async with contextlib.aclosing(self._connection()) as items:
-                    async for item in items:
-                        if isinstance(item, DeviceState) and item.state == "connected":
-                            failures = 0
-                        yield item
-                why = "the connection was closed by the device"
-            except (OSError, ValueError, DeviceFault) as error:
-                why = str(error) or type(error).__name__
-            for state in self._change("faulty", f"{self._name}: {why}"):
-                yield state
-            failures += 1
-            await asyncio.sleep(self._retry.pause(failures))
+        super().__init__(name=name, silent_after_s=silent_after_s, retry=retry)
+        self._open, self._map, self._period_s, self._reply_s = opener, registers, period_s, reply_s
 
     async def _connection(self) -> AsyncGenerator[Sequence[LoadSample] | DeviceState, None]:
         client = self._open(self._reply_s)
@@ -126,15 +102,13 @@ class ModbusLink:
                     return
                 if registers is not None:
                     alive = clock()
-                    for state in self._change("connected", self._name):
-                        yield state
-                    if registers:
-                        yield [self._map.decode(registers)]
-                elif clock() - alive > self._silent_after_s:
-                    for state in self._change("silent", f"{self._name}: nothing for {self._silent_after_s:g} s"):
-                        yield state
-                    if clock() - alive > 3 * self._silent_after_s:
-                        raise DeviceFault(f"nothing for {3 * self._silent_after_s:g} s")
+                    states = self._alive()
+                else:
+                    states = self._silence(clock() - alive)
+                for state in states:
+                    yield state
+                if registers:
+                    yield [self._map.decode(registers)]
                 due = max(due + self._period_s, clock())
                 await asyncio.sleep(self._reply_s if registers is None else due - clock())
         finally:
@@ -161,13 +135,6 @@ class ModbusLink:
                 raise DeviceFault(f"{len(answer.registers)} registers at {address} instead of {count}")
             registers |= {address + i: value for i, value in enumerate(answer.registers)}
         return registers
-
-    def _change(self, state: Literal["connected", "silent", "faulty"], why: str) -> list[DeviceState]:
-        new = DeviceState(state, why[:500])
-        if new == self._state:
-            return []
-        self._state = new
-        return [new]
 
 
 def _need_pymodbus() -> None:

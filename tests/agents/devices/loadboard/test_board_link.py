@@ -16,7 +16,7 @@ from tms_agents.devices.transport import DeviceState, Link, serial, tcp
 
 
 def board(opener, **options) -> Link[LoadSample]:
-    options = {"silent_after_s": 0.5, "tick_s": 0.002, "retry": QUICK, **options}
+    options = {"silent_after_s": 0.5, "retry": QUICK, **options}
     return Link(opener, RosTmsBoardSession, name="board", **options)
 
 
@@ -28,6 +28,12 @@ async def test_counts_come_over_a_line(kind):
         assert states(seen) == ["connected"]
         assert {sample.values for sample in samples(seen)} == {(10.0, -20.0, 30.0, 123456.0)}
         assert set(device.heard) == set("0123")
+
+
+async def test_the_board_is_asked_at_its_pace_whatever_the_tick_of_the_link():
+    async with PtyLine(RosTmsBoardDevice(lambda t: [1, 2, 3, 4])) as line:
+        link = board(serial(line.path, 115200), tick_s=1.0)
+        assert len(samples(await until(link, lambda seen: len(samples(seen)) == 30))) == 30  # in less than 8 seconds
 
 
 async def test_a_pulled_cable_is_said_and_recovers_without_restart():
