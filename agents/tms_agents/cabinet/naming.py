@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from tms_agents.cabinet.events import CabinetEvent, Identified, ZoneRead
 from tms_agents.cabinet.geometry import KnownWeight, Zone
 from tms_agents.cabinet.identify import Fit, assign
-from tms_agents.cabinet.presence import Presence
+from tms_agents.cabinet.presence import Presence, Sighting
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 
@@ -95,13 +95,13 @@ class Namer:
             while len(self._lifted) > _LEARNED_KEPT:
                 del self._lifted[next(iter(self._lifted))]
 
-    def _zone_reads(self, now: float, loose: Mapping[str, Mapping[str, object]]) -> list[CabinetEvent]:
+    def _zone_reads(self, now: float, loose: Mapping[str, Mapping[str, Sighting]]) -> list[CabinetEvent]:
         events: list[CabinetEvent] = []
         for tag, zones in loose.items():
-            if now - self._loose[tag] < self._settings.zone_read_after_s:
-                continue
-            for zone in zones:
-                if (zone, tag) not in self._told:
+            for zone, sighting in zones.items():
+                # Read for so long, not only not yet taken for gone: that takes some rounds after a thing was lifted.
+                long = sighting.last - self._loose[tag] >= self._settings.zone_read_after_s
+                if long and (zone, tag) not in self._told:
                     self._told[zone, tag] = now
                     events.append(ZoneRead(now, zone, tag))
         over = [(zone, tag) for zone, tag in self._told if zone not in loose.get(tag, {})]
