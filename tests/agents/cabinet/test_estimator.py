@@ -12,11 +12,13 @@ from tms_agents.cabinet import (
     Appeared,
     CabinetEstimator,
     CabinetEvent,
+    EstimatorSettings,
     Geometry,
     Identified,
     KnownWeight,
     Vanished,
     Zone,
+    ZoneRead,
 )
 
 CELLS = ((0.04, 0.047), (0.425, 0.047), (0.04, 0.27), (0.425, 0.27))
@@ -95,6 +97,20 @@ def test_a_tag_is_identified_and_one_missed_read_is_no_take() -> None:
     assert identified.tag == "T1"
     assert bench.run(60.0) == []
     assert [stay.tag for stay in bench.estimator.stays()] == ["T1"]
+
+
+def test_only_a_tag_that_is_read_without_a_stay_is_told_as_read_in_the_zone() -> None:
+    bench = Bench(seed=6)
+    bench.estimator = CabinetEstimator(GEOMETRY, EstimatorSettings(zone_read_after_s=0.5), zones=ZONES)
+    bench.run(4.0)
+    bench.tags = frozenset({"T1"})
+    bench.change(400 * share(0.1, 0.2))
+    bench.tags = frozenset()  # it leaves with the thing; that it is gone shows after four rounds, 0.8 s
+    assert of(ZoneRead, bench.change(-400 * share(0.1, 0.2))) == []
+    bench.tags = frozenset({"T2"})  # something hangs at the board
+    assert [one.tag for one in of(ZoneRead, bench.run(3.0))] == ["T2"]
+    bench.tags = frozenset()
+    assert [one.tag for one in of(ZoneRead, bench.run(3.0))] == [None]
 
 
 def test_state_survives_a_restart() -> None:
