@@ -29,7 +29,6 @@ from tms_client import Town
 from tms_schemas.rooms import RoomIn
 
 CELLS = np.array([[0.04, 0.047], [0.425, 0.047], [0.04, 0.27], [0.425, 0.27]])
-TAG = "E00401004E17F97A"
 CONFIG = """
 agent = "bench-cabinet"
 room = "bench"
@@ -53,7 +52,7 @@ board = "shelf"
 
 async def play() -> None:
     """The devices, as a process: ``put`` and ``take`` on stdin change the load at once."""
-    load, random = np.zeros(4), np.random.default_rng(1)
+    load, random, tag = np.zeros(4), np.random.default_rng(1), ""
 
     def counts(_: float) -> Sequence[float]:
         return [float(one) for one in load + random.normal(0, 2.0, 4)]
@@ -66,11 +65,12 @@ async def play() -> None:
                 middle, reach = CELLS.mean(axis=0), np.ptp(CELLS, axis=0) / 2
                 at = np.array([float(order[2]), float(order[3])])
                 load[:] = float(order[1]) / 4 * (1 + ((CELLS - middle) / reach**2) @ (at - middle))
-                if order[4] == "tag":
-                    reader.see(TAG)
+            elif order[0] == "see":
+                tag = order[1]
+                reader.see(tag)
             else:
                 load[:] = 0
-                reader.lose(TAG)
+                reader.lose(tag)
 
 
 @contextlib.contextmanager
@@ -117,10 +117,14 @@ def measure(seconds: float, things: int) -> None:
 def latencies(town: Town, devices: subprocess.Popen[str], things: int, kind: str) -> dict[str, list[float]]:
     random = np.random.default_rng(2)
     late: dict[str, list[float]] = {"put": [], "taken": []}
-    for _ in range(things):
+    for number in range(things):
         weight, x, y = random.uniform(50, 1000), random.uniform(0.08, 0.38), random.uniform(0.07, 0.25)
-        for what, order, there in (("put", f"put {weight} {x} {y} {kind}\n", 1), ("taken", "take\n", 0)):
+        for what, order, there in (("put", f"put {weight} {x} {y}\n", 1), ("taken", "take\n", 0)):
             assert devices.stdin
+            if what == "put" and kind == "tag":  # a hand brings it into the field before it touches the board
+                devices.stdin.write(f"see E00401{number:010X}\n")
+                devices.stdin.flush()
+                time.sleep(0.4)
             devices.stdin.write(order)
             devices.stdin.flush()
             began = time.monotonic()
