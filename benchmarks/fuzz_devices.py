@@ -79,7 +79,7 @@ class _Clocked:
 
     def held(self) -> int:
         session: Any = self._session
-        return int(getattr(session, "_parser", session).pending)
+        return int(session.pending)
 
 
 def _session(
@@ -145,29 +145,12 @@ _SCALES: dict[DialectName, list[bytes]] = {
 _LONGEST_TEXT = 200
 
 
-def _lines() -> Target:
-    parser = LineParser()
-    return Target(parser.feed, lambda: parser.pending, _LONGEST_TEXT, [*_BOARD, *_SCALES["and"]])
+def _parser(make: Callable[[], Any], longest: int, samples: Sequence[bytes]) -> Callable[[], Target]:
+    def target() -> Target:
+        parser = make()
+        return Target(parser.feed, lambda: int(parser.pending), longest, samples)
 
-
-def _tr3() -> Target:
-    parser = Tr3Parser()
-    return Target(parser.feed, lambda: parser.pending, MAX_FRAME, _TR3)
-
-
-def _llrp() -> Target:
-    parser = LlrpParser()
-    return Target(parser.feed, lambda: parser.pending, MAX_MESSAGE, _LLRP)
-
-
-def _thingmagic() -> Target:
-    parser = ReplyParser()
-    return Target(parser.feed, lambda: parser.pending, _MOST_THINGMAGIC, _THINGMAGIC)
-
-
-def _rdm6300() -> Target:
-    parser = Rdm6300Parser()
-    return Target(parser.feed, lambda: parser.pending, _RDM_FRAME, _RDM6300)
+    return target
 
 
 def _registers() -> Target:
@@ -196,20 +179,20 @@ def _scale(dialect: DialectName) -> tuple[str, Callable[[], Target]]:
 
 #: Every parser of bytes that come from a device. A new driver adds its line here.
 TARGETS: list[tuple[str, Callable[[], Target]]] = [
-    ("lines", _lines),
-    ("tr3 frames", _tr3),
+    ("lines", _parser(LineParser, _LONGEST_TEXT, [*_BOARD, *_SCALES["and"]])),
+    ("tr3 frames", _parser(Tr3Parser, MAX_FRAME, _TR3)),
     ("tr3 session", _session(lambda clock: Tr3Session(antennas=(0, 1), clock=clock), MAX_FRAME, _TR3)),
-    ("llrp messages", _llrp),
+    ("llrp messages", _parser(LlrpParser, MAX_MESSAGE, _LLRP)),
     ("llrp session", _session(lambda _: LlrpSession(), MAX_MESSAGE, _LLRP)),
     ("llrp rounds", _session(lambda _: LlrpSession(antennas=(1, 2), round_s=0.2), MAX_MESSAGE, _LLRP)),
-    ("thingmagic frames", _thingmagic),
+    ("thingmagic frames", _parser(ReplyParser, _MOST_THINGMAGIC, _THINGMAGIC)),
     (
         "thingmagic session",
         _session(lambda clock: ThingMagicSession(antennas=(1, 2), clock=clock), _MOST_THINGMAGIC, _THINGMAGIC),
     ),
     ("scanner", _session(lambda clock: ScannerSession(clock=clock), _LONGEST_TEXT, _SCANNER)),
     ("text reader", _session(lambda clock: TextReaderSession(clock=clock), _LONGEST_TEXT, _TEXT_READER)),
-    ("rdm6300 frames", _rdm6300),
+    ("rdm6300 frames", _parser(Rdm6300Parser, _RDM_FRAME, _RDM6300)),
     ("load-cell board", _session(lambda clock: RosTmsBoardSession(clock=clock), _LONGEST_TEXT, _BOARD)),
     _scale("openscale"),
     _scale("and"),

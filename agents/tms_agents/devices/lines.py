@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 
+from tms_agents.devices.framing import FrameBuffer
+
 _LINE_END = re.compile(rb"[\r\n]+")
 
 
-class LineParser:
+class LineParser(FrameBuffer):
     """Incremental: feed bytes as they come, get whole lines without their CR and LF; empty lines are left out.
 
     A line longer than ``longest`` bytes is dropped whole, to its end; ``skipped`` counts the bytes dropped. At most
@@ -15,34 +17,27 @@ class LineParser:
     """
 
     def __init__(self, longest: int = 200) -> None:
+        super().__init__()
         self._longest = longest
-        self._buffer = b""
         self._overlong = False
-        self.skipped = 0
 
     def feed(self, data: bytes) -> list[bytes]:
         *ended, rest = _LINE_END.split(data)
         lines = []
         for part in ended:
-            line = self._buffer + part
+            line = bytes(self._buffer + part)
             if self._overlong or len(line) > self._longest:
                 self.skipped += len(line)
             elif line:
                 lines.append(line)
-            self._buffer, self._overlong = b"", False
+            self._buffer.clear()
+            self._overlong = False
         self._buffer += rest
         if self._overlong or len(self._buffer) > self._longest:
+            super().expire()
             self._overlong = True
-            self.skipped += len(self._buffer)
-            self._buffer = b""
         return lines
 
     def expire(self) -> None:
-        """Forget the line that has begun: its end will not come, or not in time."""
-        self.skipped += len(self._buffer)
-        self._buffer, self._overlong = b"", False
-
-    @property
-    def pending(self) -> int:
-        """Bytes of an incomplete line."""
-        return len(self._buffer)
+        super().expire()
+        self._overlong = False

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tms_agents.devices.lines import LineParser
+from tms_agents.devices.listening import ListeningSession
 
 #: Lengths of EAN-8, UPC-A, EAN-13 and GTIN-14.
 _LENGTHS = (8, 12, 13, 14)
@@ -99,37 +100,14 @@ def _gtin(elements: str) -> str | None:
     return None
 
 
-class ScannerSession:
-    """A scanner says nothing while nobody scans: its line alone makes it connected.
-
-    A line that stops in the middle for ``idle_s`` is dropped.
-    """
+class ScannerSession(ListeningSession[Scan | Misread]):
+    """A scanner says nothing while nobody scans."""
 
     def __init__(self, *, idle_s: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
-        self.frames = 0
-        self.ready = True
-        self._parser = LineParser(_LONGEST_LINE)
-        self._idle_s, self._clock = idle_s, clock
-        self._since = clock()
+        self._lines = LineParser(_LONGEST_LINE)
+        super().__init__(self._lines, idle_s=idle_s, clock=clock)
 
-    def opened(self) -> None:
-        """The open line is all the life it shows."""
-        self.frames += 1
-
-    def receive(self, data: bytes) -> list[Scan | Misread]:
-        self._since = self._clock()
-        lines = self._parser.feed(data)
+    def _heard(self, data: bytes) -> list[Scan | Misread]:
+        lines = self._lines.feed(data)
         self.frames += len(lines)
         return [decode(line.decode("ascii", "replace")) for line in lines]
-
-    def tick(self) -> None:
-        """Drop what has begun and does not end; the open line counts as a sign of life."""
-        if self._parser.pending and self._clock() - self._since > self._idle_s:
-            self._parser.expire()
-        self.frames += 1
-
-    def output(self) -> bytes:
-        return b""
-
-    def closing(self) -> bytes:
-        return b""

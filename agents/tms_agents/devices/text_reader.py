@@ -7,7 +7,9 @@ import time
 from collections.abc import Callable
 from typing import Literal
 
+from tms_agents.devices.framing import FrameBuffer
 from tms_agents.devices.lines import LineParser
+from tms_agents.devices.listening import ListeningSession
 from tms_agents.devices.tags import TagRead
 
 #: 8 and 14 digits: ISO 14443 UIDs of 4 and 7 bytes; 16: ISO 15693; 24: EPC of 96 bits.
@@ -31,12 +33,8 @@ def tag_of_line(line: str, order: ByteOrder = "as printed") -> str | None:
     return (raw[::-1] if order == "reversed" else raw).hex().upper()
 
 
-class Rdm6300Parser:
+class Rdm6300Parser(FrameBuffer):
     """RDM6300 (125 kHz): ``02``, ten hex digits of the tag, two of their XOR, ``03``; all else is skipped."""
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-        self.skipped = 0
 
     def feed(self, data: bytes) -> list[str]:
         """Tags as ten upper-case hex digits."""
@@ -56,15 +54,6 @@ class Rdm6300Parser:
                 self._buffer.clear()
         return tags
 
-    def expire(self) -> None:
-        self.skipped += len(self._buffer)
-        self._buffer.clear()
-
-    @property
-    def pending(self) -> int:
-        """Bytes of an incomplete frame."""
-        return len(self._buffer)
-
 
 def _rdm_tag(frame: bytes) -> str | None:
     if frame[-1] != _ETX or not re.fullmatch(rb"[0-9A-Fa-f]{12}", frame[1:-1]):
@@ -75,11 +64,10 @@ def _rdm_tag(frame: bytes) -> str | None:
     return None if check else bytes(raw).hex().upper()
 
 
-class TextReaderSession:
-    """Such a reader says nothing while there is no tag: its open line alone makes it connected, and it has no rounds.
+class TextReaderSession(ListeningSession[TagRead]):
+    """Such a reader says nothing while there is no tag, and has no rounds.
 
-    ``order``: some readers print the UID with its bytes reversed. ``garbled`` counts lines without a tag. What stops in
-    the middle for ``idle_s`` is dropped.
+    ``order``: some readers print the UID with its bytes reversed. ``garbled`` counts lines without a tag.
     """
 
     def __init__(
@@ -91,36 +79,16 @@ class TextReaderSession:
         idle_s: float = 1.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.frames = 0
-        self.ready = True
-        self.garbled = 0
-        self._order, self._antenna = order, antenna
         self._lines = LineParser(_LONGEST_LINE)
         self._rdm = Rdm6300Parser() if form == "rdm6300" else None
-        self._parser = self._rdm or self._lines
-        self._idle_s, self._clock = idle_s, clock
-        self._since = clock()
+        super().__init__(self._rdm or self._lines, idle_s=idle_s, clock=clock)
+        self.garbled = 0
+        self._order, self._antenna = order, antenna
 
-    def opened(self) -> None:
-        self.frames += 1
-
-    def receive(self, data: bytes) -> list[TagRead]:
-        self._since = self._clock()
+    def _heard(self, data: bytes) -> list[TagRead]:
         tags = self._rdm.feed(data) if self._rdm else self._tags(data)
         self.frames += len(tags)
         return [TagRead(tag=tag, antenna=self._antenna) for tag in tags]
-
-    def tick(self) -> None:
-        """Drop what has begun and does not end; the open line counts as a sign of life."""
-        if self._parser.pending and self._clock() - self._since > self._idle_s:
-            self._parser.expire()
-        self.frames += 1
-
-    def output(self) -> bytes:
-        return b""
-
-    def closing(self) -> bytes:
-        return b""
 
     def _tags(self, data: bytes) -> list[str]:
         found = [tag_of_line(line.decode("ascii", "replace"), self._order) for line in self._lines.feed(data)]

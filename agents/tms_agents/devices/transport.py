@@ -22,6 +22,7 @@ T_co = TypeVar("T_co", covariant=True)
 #: Commands waiting to be taken by the device: beyond this it is stuck.
 _MAX_UNSENT_BYTES = 1 << 16
 _READ_BYTES = 1 << 16
+_SHORTEST_TICK_S = 0.001
 
 
 class DeviceFault(Exception):
@@ -198,7 +199,9 @@ class Link(DeviceLink[T]):
     async def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
         stream = await self._open()
         session = self._session()
-        tick_s = min(self._tick_s, session.tick_s) if isinstance(session, Paced) else self._tick_s
+        tick_s = self._tick_s
+        if isinstance(session, Paced):
+            tick_s = min(tick_s, max(session.tick_s, _SHORTEST_TICK_S))
         clock = asyncio.get_running_loop().time
         alive, frames = clock(), 0
         try:

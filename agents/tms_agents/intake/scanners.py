@@ -40,4 +40,4 @@ def open_scanner(
         opener, name = serial(source.device, source.baud), f"scanner {source.device}"
     else:
         opener, name = tcp(source.host, source.port), f"scanner {source.host}:{source.port}"
-    return Link(opener, ScannerSession, name=name, tick_s=0.05).listen()
+    return Link(opener, ScannerSession, name=name).listen()

@@ -103,7 +103,6 @@ def _link(source: _Device, silent_after_s: float, field: Field | None) -> Link[T
             ),
             name=f"ThingMagic {source.device}",
             silent_after_s=silent_after_s,
-            tick_s=min(0.05, source.poll_s / 2),
         )
     kind = "text reader" if isinstance(source, TextSerialSource | TextTcpSource) else "TR3"
     if isinstance(source, Tr3SerialSource | TextSerialSource):
@@ -124,7 +123,6 @@ def _link(source: _Device, silent_after_s: float, field: Field | None) -> Link[T
         ),
         name=name,
         silent_after_s=silent_after_s,
-        tick_s=min(0.05, source.poll_s / 2),
     )
 
 

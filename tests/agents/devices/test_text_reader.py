@@ -75,7 +75,7 @@ def test_any_bytes_are_survived(pieces, form):
     session = TextReaderSession(form=form)
     for piece in pieces:
         assert all(read.tag for read in session.receive(piece))
-        assert session._parser.pending <= 200
+        assert session.pending <= 200
 
 
 @pytest.mark.parametrize("form", ["lines", "rdm6300"])

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from tms_agents.devices.framing import FrameBuffer
 from tms_agents.devices.llrp.tables import MESSAGE_TYPES, MESSAGES, PARAMETER_TYPES, TLV, TV, Layout
 
 HEADER = struct.Struct(">HII")
@@ -66,16 +67,12 @@ class Message(Parameter):
     version: int = 1
 
 
-class FrameParser:
+class FrameParser(FrameBuffer):
     """Incremental: feed bytes as they come, get whole messages.
 
     What cannot be a message header (reserved bits, version, unknown type, absurd length) or is a malformed message is
     skipped byte by byte until a message fits; ``skipped`` counts. At most ``MAX_MESSAGE`` bytes are held.
     """
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-        self.skipped = 0
 
     def feed(self, data: bytes) -> list[Message]:
         """Messages completed by ``data``, in order."""
@@ -85,11 +82,6 @@ class FrameParser:
             self._buffer += data[start : start + MAX_MESSAGE]
             messages += self._cut()
         return messages
-
-    @property
-    def pending(self) -> int:
-        """Bytes of an incomplete message."""
-        return len(self._buffer)
 
     def _cut(self) -> list[Message]:
         messages: list[Message] = []

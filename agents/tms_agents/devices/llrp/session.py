@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 from tms_agents.devices.llrp import messages
 from tms_agents.devices.llrp.codec import FrameParser, Message, Parameter, encode
+from tms_agents.devices.outgoing import Outgoing
 from tms_agents.devices.tags import RoundEnd, TagItem
 from tms_agents.devices.transport import DeviceFault
 
 
-class LlrpSession:
+class LlrpSession(Outgoing):
     """Waits for the reader's greeting, then: configure, delete old ROSpecs, add one that reads for ever, enable it.
 
     Without ``round_s`` all ``antennas`` (0: every one) read together and each tag is reported at once. With it they
@@ -24,11 +25,11 @@ class LlrpSession:
     def __init__(
         self, *, antennas: Sequence[int] = (0,), keepalive_s: float = 3.0, round_s: float | None = None
     ) -> None:
+        super().__init__()
         self.frames = 0
         self.ready = False
         self._antennas = tuple(antennas)
         self._parser = FrameParser()
-        self._output = bytearray()
         self._next_id = 1
         self._waiting_for: str | None = None
         self._unplugged: set[int] = set()
@@ -67,14 +68,14 @@ class LlrpSession:
     def tick(self) -> None:
         """The reader keeps the connection alive."""
 
-    def output(self) -> bytes:
-        data = bytes(self._output)
-        self._output.clear()
-        return data
-
     def closing(self) -> bytes:
         self._send(Message("CLOSE_CONNECTION"))
         return self.output()
+
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete message."""
+        return self._parser.pending
 
     def _configuration(self, keepalive_ms: int, rounds: bool) -> list[Message]:
         if not rounds:

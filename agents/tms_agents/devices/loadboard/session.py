@@ -22,6 +22,7 @@ from collections.abc import Callable
 
 from tms_agents.devices.lines import LineParser
 from tms_agents.devices.loads import LoadSample
+from tms_agents.devices.outgoing import Outgoing
 
 #: Sensor index -> the character that asks for it.
 INDEX = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -37,7 +38,7 @@ _FORGET, _RELAX = 0.999, 0.998
 _LONGEST_PAUSE_S = 2.0
 
 
-class RosTmsBoardSession:
+class RosTmsBoardSession(Outgoing):
     """Delivers a ``LoadSample`` of counts per round, one round every ``period_s`` seconds if the board is fast enough.
 
     ``reply_s``: an answer later than this is missing. A cell that misses three in a row is NaN from then on and asked
@@ -60,6 +61,7 @@ class RosTmsBoardSession:
     ) -> None:
         if not 1 <= cells <= len(INDEX):
             raise ValueError(f"a board has 1 to {len(INDEX)} cells, not {cells}")
+        super().__init__()
         self.frames = 0
         self.ready = False
         self.tick_s = period_s / 10  # a round ends only after some looks at a quiet line
@@ -68,7 +70,6 @@ class RosTmsBoardSession:
         self._period_s, self._reply_s, self._late_s, self._retry_s = period_s, reply_s, late_s, retry_s
         self._clock = clock
         self._lines = LineParser(_LONGEST_LINE)
-        self._output = bytearray()
         self._values = [float("nan")] * cells
         self._misses = [0] * cells
         self._ask_again = [0.0] * cells
@@ -106,14 +107,6 @@ class RosTmsBoardSession:
             self._finish()
         if self._asked is None and not self._draining and not self._open_round and now >= self._next_round:
             self._start(now)
-
-    def output(self) -> bytes:
-        data = bytes(self._output)
-        self._output.clear()
-        return data
-
-    def closing(self) -> bytes:
-        return b""
 
     @property
     def pending(self) -> int:

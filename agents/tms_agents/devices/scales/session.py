@@ -9,6 +9,7 @@ from typing import Literal
 
 from tms_agents.devices.lines import LineParser
 from tms_agents.devices.loads import LoadSample
+from tms_agents.devices.outgoing import Outgoing
 from tms_agents.devices.scales.dialects import DIALECTS, Answer, Dialect, DialectName, Mode, Reading, parse_line
 from tms_agents.devices.scales.parity import add_even_parity, strip_even_parity
 from tms_agents.devices.transport import DeviceFault
@@ -18,7 +19,7 @@ _REFUSALS = 3
 _MAX_COMMANDS = 8
 
 
-class ScaleLineSession:
+class ScaleLineSession(Outgoing):
     """Delivers a ``LoadSample`` of one cell, in grams, for every weight line.
 
     ``poll`` asks ``poll_s`` after the last question, at the earliest when it was answered or after ``reply_s``.
@@ -45,14 +46,15 @@ class ScaleLineSession:
         software_parity: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        super().__init__()
         self.frames = 0
         self.ready = False
+        self.tick_s = min(0.05, poll_s / 2)
         self.doubtful = 0
         self._dialect = dialect if isinstance(dialect, Dialect) else DIALECTS[dialect]
         self._mode, self._poll_s, self._reply_s = mode, poll_s, reply_s
         self._parity, self._clock = software_parity, clock
         self._lines = LineParser()
-        self._output = bytearray()
         self._commands: deque[bytes] = deque()
         self._sent: bytes | None = None
         self._sent_at = self._asked_at = self._heard_at = float("-inf")
@@ -95,8 +97,7 @@ class ScaleLineSession:
             self._next(now)
 
     def output(self) -> bytes:
-        data = bytes(self._output)
-        self._output.clear()
+        data = super().output()
         return add_even_parity(data) if self._parity else data
 
     def closing(self) -> bytes:

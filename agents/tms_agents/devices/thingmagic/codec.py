@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tms_agents.devices.framing import FrameBuffer
+
 _START = 0xFF
 _LONGEST_DATA = 250
 
@@ -57,25 +59,11 @@ def _frame(body: bytes) -> bytes:
     return bytes([_START]) + body + crc(body).to_bytes(2, "big")
 
 
-class _Parser:
+class _Parser(FrameBuffer):
     """Incremental: cuts bytes into frames with a right CRC and skips everything else, counted in ``skipped``."""
 
     #: Bytes of a frame that are not data, and of those between the length and the data.
     _around: int
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-        self.skipped = 0
-
-    def expire(self) -> None:
-        """The line is idle: what has begun will not end."""
-        self.skipped += len(self._buffer)
-        self._buffer.clear()
-
-    @property
-    def pending(self) -> int:
-        """Bytes of an incomplete frame."""
-        return len(self._buffer)
 
     def _bodies(self, data: bytes) -> list[bytes]:
         """Frames without start byte and CRC; less than the longest frame is held."""

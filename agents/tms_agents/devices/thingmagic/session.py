@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Literal
 
+from tms_agents.devices.polling import PollingReader
 from tms_agents.devices.tags import Field, RoundEnd, TagItem, TagRead
 from tms_agents.devices.thingmagic import messages as m
 from tms_agents.devices.thingmagic.codec import Command, Reply, ReplyParser
@@ -16,7 +17,7 @@ from tms_agents.devices.transport import DeviceFault
 _MAX_RESTARTS = 3
 
 
-class ThingMagicSession:
+class ThingMagicSession(PollingReader[tuple[Command, int], Reply]):
     """Every ``poll_s`` seconds a cycle over all ``antennas``: select, read for ``read_ms``, ``RoundEnd``.
 
     ``multiple`` collects tags in the reader's buffer and fetches them with count, RSSI and antenna. ``single`` reads
@@ -38,63 +39,20 @@ class ThingMagicSession:
         field: Field | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.frames = 0
-        self.ready = False
-        self.field = field or Field()
-        self.field.is_off = False
+        super().__init__(ReplyParser(), poll_s=poll_s, reply_s=reply_s, field=field, clock=clock)
         self._antennas, self._single = tuple(antennas), mode == "single"
         self._read = m.read_single(read_ms) if self._single else m.read_multiple(read_ms)
-        self._poll_s, self._reply_s, self._read_s = poll_s, reply_s, read_ms / 1000
+        self._read_s = read_ms / 1000
         # Booting refuses with "invalid command" where the firmware runs already.
         self._set_up = [m.boot(), Command(m.VERSION), m.set_region(region), m.set_protocol()]
         if power_dbm is not None:
             self._set_up.append(m.set_read_power(power_dbm))
-        self._clock = clock
-        self._parser = ReplyParser()
-        self._output = bytearray()
-        self._waiting: deque[tuple[Command, int]] = deque()
-        self._current: tuple[Command, int] | None = None
         self._to_fetch = 0
         self._elsewhere = False
         self._restarts = 0
-        self._since = self._next_poll = clock()
         self._start_over()
 
-    def pause(self) -> None:
-        """Read no more; ``field.is_off`` tells when the read under way is over."""
-        self.field.pause()
-
-    def resume(self) -> None:
-        self.field.resume()
-
-    def opened(self) -> None:
-        self.tick()
-
-    def receive(self, data: bytes) -> list[TagItem]:
-        items = [item for reply in self._parser.feed(data) for item in self._take(reply)]
-        self._advance()
-        return items
-
-    def tick(self) -> None:
-        """Give up a reply that does not come; start the next cycle when it is due."""
-        patience = self._reply_s + (self._read_s if self._current and self._current[0] == self._read else 0.0)
-        if self._clock() - self._since > patience and (self._current or self._parser.pending):
-            self._parser.expire()
-            if self._current is not None:
-                self._start_over()
-        self._advance()
-
-    def output(self) -> bytes:
-        data = bytes(self._output)
-        self._output.clear()
-        return data
-
-    def closing(self) -> bytes:
-        return b""
-
     def _take(self, reply: Reply) -> list[TagItem]:
-        self.frames += 1
-        self._since = self._clock()
         if self._current is None or reply.code != self._current[0].code:
             return []  # a late reply
         (command, antenna), self._current = self._current, None
@@ -154,24 +112,23 @@ class ThingMagicSession:
         self._current = None
         self._waiting = deque((command, 0) for command in self._set_up)
 
-    def _advance(self) -> None:
-        if self._current is not None:
-            return
+    def _plan(self) -> None:
         if not self.field.wanted:
             self.field.is_off = True
             self._drop_reads()
-            if not self._waiting and self._clock() >= self._next_poll:  # still there?
-                self._next_poll = self._clock() + self._poll_s
+            if self._is_due():  # still there?
                 self._waiting.append((Command(m.VERSION), 0))
-        elif not self._waiting and self._clock() >= self._next_poll:
-            self._next_poll = self._clock() + self._poll_s
+        elif self._is_due():
             for antenna in self._antennas:
                 commands = [m.set_antenna(antenna), *([] if self._single else [m.clear_buffer()]), self._read]
                 self._waiting += [(command, antenna) for command in commands]
-        if self._waiting:
-            self._current = self._waiting.popleft()
-            self._since = self._clock()
-            self._output += self._current[0].encode()
+
+    def _encode(self, command: tuple[Command, int]) -> bytes:
+        return command[0].encode()
+
+    def _patience_s(self) -> float:
+        reads = self._current is not None and self._current[0] == self._read
+        return self._reply_s + (self._read_s if reads else 0.0)
 
     def _drop_reads(self) -> None:
         # setting up and fetching what is read already do not radiate

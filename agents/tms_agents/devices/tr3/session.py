@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
+from tms_agents.devices.polling import PollingReader
 from tms_agents.devices.tags import Field, RoundEnd, TagItem, TagRead
 from tms_agents.devices.tr3.codec import (
     INVENTORY_OPTIONS,
@@ -39,7 +40,7 @@ class _Command(NamedTuple):
     optional: bool = False
 
 
-class Tr3Session:
+class Tr3Session(PollingReader[_Command, Frame]):
     """``inventory``: every ``poll_s`` seconds a cycle over all antennas: select, ask for the tags, ``RoundEnd``.
 
     A TR3 does not report a UID again until the antenna is switched. Where a cycle begins at the antenna that is
@@ -63,18 +64,10 @@ class Tr3Session:
         field: Field | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.frames = 0
-        self.ready = False
-        self.field = field or Field()
-        self.field.is_off = False
-        self._antennas, self._poll_s, self._reply_s = tuple(antennas), poll_s, reply_s
+        super().__init__(FrameParser(), poll_s=poll_s, reply_s=reply_s, field=field, clock=clock)
+        self._antennas = tuple(antennas)
         self._rests, self._rest_antenna = rf_off_between_rounds, rest_antenna
         self._polls = mode == "inventory"
-        self._clock = clock
-        self._parser = FrameParser()
-        self._output = bytearray()
-        self._waiting: deque[_Command] = deque()
-        self._current: _Command | None = None
         self._repeats = 0
         self._tags_to_come: int | None = None
         self._set_up = False
@@ -85,43 +78,11 @@ class Tr3Session:
         self._option = INVENTORY_OPTIONS[0]
         self._options_left = list(INVENTORY_OPTIONS[1:])
         self._forgetful = _Forgetful()
-        self._since = self._next_poll = clock()
-
-    def pause(self) -> None:
-        """Switch the field off as soon as the command under way is answered; ``field.is_off`` then says so."""
-        self.field.pause()
-
-    def resume(self) -> None:
-        self.field.resume()
-
-    def opened(self) -> None:
-        self.tick()
-
-    def receive(self, data: bytes) -> list[TagItem]:
-        items = [item for frame in self._parser.feed(data) for item in self._take(frame)]
-        self._advance()
-        return items
-
-    def tick(self) -> None:
-        """Give up a reply that does not come; start the next cycle when it is due."""
-        if self._clock() - self._since > self._reply_s and (self._current or self._parser.pending):
-            self._parser.expire()
-            if self._current is not None:
-                self._start_over()
-        if self._polls:
-            self._advance()
-
-    def output(self) -> bytes:
-        data = bytes(self._output)
-        self._output.clear()
-        return data
 
     def closing(self) -> bytes:
         return rf_power(False).encode() if self._polls else b""
 
     def _take(self, frame: Frame) -> list[TagItem]:
-        self.frames += 1
-        self._since = self._clock()
         uid, current = frame.uid(), self._current
         if frame.command == RDLOOP and uid is not None and not self._polls:
             self.ready = True
@@ -201,26 +162,23 @@ class Tr3Session:
         self.field.is_off = False
         self._set_up, self._radiates, self._selected, self._pausing = False, None, None, False
 
-    def _advance(self) -> None:
-        if not self._polls or self._current is not None:
+    def _plan(self) -> None:
+        if not self._polls:
             return
         if not self.field.wanted:
             if not self._pausing:
                 self._pausing = True
                 self._waiting = deque() if self._radiates is False else deque(self._switched_off())
                 self.field.is_off = self._radiates is False
-            elif not self._waiting and self._clock() >= self._next_poll:  # still there?
-                self._next_poll = self._clock() + self._poll_s
+            elif self._is_due():  # still there?
                 self._waiting.append(_Command(read_version(), optional=True))
         else:
             self._pausing = False
-            if not self._waiting and self._clock() >= self._next_poll:
-                self._next_poll = self._clock() + self._poll_s
+            if self._is_due():
                 self._waiting += self._cycle()
-        if self._waiting:
-            self._current = self._waiting.popleft()
-            self._since = self._clock()
-            self._output += self._current.frame.encode()
+
+    def _encode(self, command: _Command) -> bytes:
+        return command.frame.encode()
 
     def _cycle(self) -> list[_Command]:
         commands = [] if self._set_up else [_Command(command_mode(), optional=True)]
