@@ -131,6 +131,12 @@ class Rig:
             raise AssertionError(f"not {state} ({why}) within {timeout_s} s, but {view.state}: {view.why}") from None
         return view
 
+    async def ready(self, *devices: str) -> None:
+        """Wait until the devices deliver and the agent knows the empty board."""
+        for device in devices:
+            await self.state("connected", device)
+        await asyncio.sleep(1.0)
+
     async def count(self, labels: int, timeout_s: float = 10.0) -> dict[str, LabelView]:
         """Wait until the server has so many labels."""
         async with asyncio.timeout(timeout_s):

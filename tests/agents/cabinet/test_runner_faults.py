@@ -26,7 +26,7 @@ async def test_faults_of_a_board(rig):
     async with PtyLine(device, tick_s=0.005) as line:
         cabinet = rig(f'{{kind = "ros-tms", device = "{line.path}"}}')
         async with cabinet.agent():
-            await cabinet.state("connected", "shelf")
+            await cabinet.ready("shelf")
             shelf.put("milk", 500, 0.1, 0.2)
             before = only(await cabinet.count(1))
 
@@ -74,7 +74,7 @@ async def test_faults_of_a_reader(rig):
         cabinet = rig(f'{{kind = "ros-tms", device = "{board.path}"}}', reader=source)
         cabinet.register(MILK, "Milk")
         async with cabinet.agent():
-            await cabinet.state("connected", "reader")
+            await cabinet.ready("shelf", "reader")
             shelf.put("milk", 500, 0.1, 0.2)
             reader.see(MILK)
             before = only(await cabinet.count(1))
@@ -110,7 +110,7 @@ async def test_faults_of_a_scale(rig):
         load = f'{{kind = "and", host = "127.0.0.1", port = {line.port}, poll_s = 0.05}}'
         cabinet = rig(load, cells=False)
         async with cabinet.agent():
-            await cabinet.state("connected", "shelf: scale")
+            await cabinet.ready("shelf")
             shelf.put("milk", 500, 0.1, 0.2)
             before = only(await cabinet.count(1))
 

@@ -115,7 +115,7 @@ async def test_watch_the_agent_and_the_devices(rig):
         cabinet = rig(f'{{kind = "ros-tms", device = "{board.path}"}}', reader=source)
         once = ("cabinet", "watch", "--once", "--config", str(cabinet.config))
         async with cabinet.agent():
-            await cabinet.state("connected", "shelf")
+            await cabinet.ready("shelf", "reader")
             reader.see(MILK)
             shelf.put("milk", 500, 0.1, 0.2)
             await cabinet.count(1)
