@@ -1,9 +1,9 @@
-"""A real server for the cabinet agent, and a room of its own for each test."""
+"""A cabinet of its own for each test."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,32 +14,14 @@ sys.path.append(str(Path(__file__).parent))  # for cabinet_rig
 from cabinet_rig import Rig, calibration_toml, config_toml
 
 from tms_client import Town
-from tms_schemas.rooms import RoomIn
 
 MakeRig = Callable[..., Rig]
 
 
-@pytest.fixture(scope="package")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    with ServerProcess(tmp_path_factory.mktemp("server")) as server:
-        yield server
-
-
 @pytest.fixture
-def town(server: ServerProcess) -> Iterator[Town]:
-    with Town(server.url) as town:
-        yield town
-
-
-@pytest.fixture
-def rig(server: ServerProcess, town: Town, tmp_path: Path, request: pytest.FixtureRequest) -> MakeRig:
+def rig(server: ServerProcess, town: Town, tmp_path: Path, make_room: Callable[..., str]) -> MakeRig:
     """Make a cabinet: what weighs it (TOML), and options of ``config_toml``."""
-    name = f"r{abs(hash(request.node.nodeid))}"
-    zones = [{"id": "shelf", "polygon": [[1, 1], [3, 1], [3, 3], [1, 3]]}]
-    sensors = [{"agent": f"{name}-cabinet", "kind": "cabinet", "zones": zones}]
-    town.rooms.put(
-        name, RoomIn.model_validate({"name": "Lab", "outline": [[0, 0], [5, 0], [5, 4]], "sensors": sensors})
-    )
+    name = make_room("cabinet", {"shelf": [[1, 1], [3, 1], [3, 3], [1, 3]]})
 
     def make(load: str, **options: str | bool) -> Rig:
         path = tmp_path / "cabinet.toml"

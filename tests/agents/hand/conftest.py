@@ -1,42 +1,21 @@
-"""A real server with one room, and configuration files for the hand agent."""
+"""A room and configuration files for the hand agent."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from server_process import ServerProcess
 
-from tms_client import Town
-from tms_schemas.rooms import RoomIn
-
 Configure = Callable[..., Path]
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    with ServerProcess(tmp_path_factory.mktemp("server")) as server:
-        yield server
-
-
 @pytest.fixture
-def town(server: ServerProcess) -> Iterator[Town]:
-    with Town(server.url) as town:
-        yield town
-
-
-@pytest.fixture
-def room(town: Town, request: pytest.FixtureRequest) -> str:
+def room(make_room: Callable[..., str]) -> str:
     """A room of its own for each test."""
-    name = f"r{abs(hash(request.node.nodeid))}"
-    zones = [{"id": "hand", "polygon": [[0, 0], [1, 0], [1, 1]]}]
-    sensors = [{"agent": f"{name}-hand", "kind": "hand", "zones": zones}]
-    town.rooms.put(
-        name, RoomIn.model_validate({"name": "Lab", "outline": [[0, 0], [5, 0], [5, 4]], "sensors": sensors})
-    )
-    return name
+    return make_room("hand", {"hand": [[0, 0], [1, 0], [1, 1]]})
 
 
 @pytest.fixture

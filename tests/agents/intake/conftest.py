@@ -32,12 +32,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
         yield server
 
 
-@pytest.fixture
-def town(server: ServerProcess) -> Iterator[Town]:
-    with Town(server.url) as town:
-        yield town
-
-
 class Carer:
     """Sits before ``tms intake``: types, and reads what it says."""
 
