@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+#: The laboratory's own threshold for a thing.
+_SMALL_SUM_G = 20.0
 
 
 class Continuity:
@@ -15,8 +17,8 @@ class Continuity:
 
     ``interrupted`` is called when the device stopped delivering. The first ``settle_s`` seconds after that are held
     back and averaged. The zero is corrected where that mean differs from the level before by at most ``small_g`` in
-    every cell, or, for a device that ``zeroes_itself`` at power-on, where it shows about nothing at all. Any other
-    difference is what people did meanwhile, and is left to the estimator.
+    every cell and 20 g in sum, or, for a device that ``zeroes_itself`` at power-on, where it shows about nothing at
+    all. Any other difference is what people did meanwhile, and is left to the estimator.
     """
 
     def __init__(
@@ -58,9 +60,10 @@ class Continuity:
         self._waiting, self._held = False, []
         if self.level is None:
             return
-        if np.abs(now + self.shift - self.level).max() <= self._small_g or (
-            self._zeroes_itself and np.abs(now).max() <= self._small_g
-        ):
+        jump = now + self.shift - self.level
+        # Zeros jump each for itself, up and down; a thing loads all cells in the same direction.
+        drifted = np.abs(jump).max() <= self._small_g and abs(jump.sum()) <= _SMALL_SUM_G
+        if drifted or (self._zeroes_itself and np.abs(now).max() <= self._small_g):
             self.shift = self.level - now
 
     def _follow(self, t: float, grams: Floats) -> None:

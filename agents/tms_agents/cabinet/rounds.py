@@ -19,10 +19,11 @@ class Round(NamedTuple):
 
 
 class Rounds:
-    """Collects per antenna. Where the reader ``tells_ends`` of its rounds, only those count; of any other, what it
+    """Collects per antenna.
 
-    reported within ``window_s`` seconds is a round. Antennas that share a zone are one: its round is complete when each of them
-    was asked. Tags longer than 64 digits do not exist on the wire and are left out.
+    Where the reader ``tells_ends`` of its rounds, only those count; of any other, what it reported within ``window_s``
+    seconds is a round. Antennas that share a zone are one: its round is complete when each of them was asked. Tags
+    longer than 64 digits do not exist on the wire and are left out.
     """
 
     def __init__(

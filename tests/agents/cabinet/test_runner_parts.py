@@ -82,6 +82,7 @@ def test_zeros_that_jump_at_power_on_are_no_change():
 def test_what_people_did_meanwhile_is_a_change():
     assert interrupted([500.0, 300.0], [1.0, -2.0])[1] == [1.0, -2.0]
     assert interrupted([500.0, 300.0], [900.0, 300.0], zeroes_itself=True)[1] == [900.0, 300.0]
+    assert interrupted([500.0, 300.0], [512.0, 313.0])[1] == [512.0, 313.0]  # a light thing, on both cells
 
 
 def test_a_corrected_zero_is_remembered():
