@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
-from tms_agents.cabinet.events import CabinetEvent, Identified, ZoneRead
+from tms_agents.cabinet.events import CabinetEvent, Identified, Vanished, ZoneRead
 from tms_agents.cabinet.geometry import KnownWeight, Zone
 from tms_agents.cabinet.identify import Fit, assign
 from tms_agents.cabinet.presence import Presence, Sighting
@@ -13,6 +14,8 @@ from tms_agents.cabinet.stays import Shelf, Thing
 
 #: Weights of that many objects are remembered from their stays.
 _LEARNED_KEPT = 5000
+#: A tag that was away for so long, and came back within so long of a new thing, came with it.
+_AWAY_S, _BROUGHT_S = 2.0, 8.0
 
 
 class Namer:
@@ -48,10 +51,10 @@ class Namer:
         While the load is not ``resting`` no tag is pinned: it may be that of the thing which is just being put.
         """
         present = self._presence.present()
+        events = self._moved_unseen(now, present) if resting else []
         pinned = {thing.tag for thing in self._shelf.things.values() if thing.tag is not None}
         loose = {tag: zones for tag, zones in present.items() if tag not in pinned}
         self._loose = {tag: self._loose.get(tag, now) for tag in loose}
-        events: list[CabinetEvent] = []
         open_things = [thing for thing in self._shelf.things.values() if thing.tag is None]
         if resting and open_things and loose:
             weights = {tag: weight for tag in loose if (weight := self.weight(tag)) is not None}
@@ -72,6 +75,25 @@ class Namer:
             if thing.joint:
                 self._weigh_apart(thing, weight)
         return Identified(now, thing.id, tag)
+
+    def _moved_unseen(self, now: float, present: Mapping[str, Mapping[str, Sighting]]) -> list[CabinetEvent]:
+        """Stays whose tag was away and came back with another thing of its weight: that they ended was missed."""
+        gone: list[CabinetEvent] = []
+        for old in [thing for thing in self._shelf.things.values() if thing.tag in present]:
+            assert old.tag is not None
+            left = max(sighting.left for sighting in present[old.tag].values())
+            back = min(sighting.first for sighting in present[old.tag].values())
+            if left < old.since or back - left < _AWAY_S:
+                continue
+            at = old.centre(self._shelf.geometry)
+            for new in self._shelf.things.values():
+                weight, sd = (value for value in new.centre(self._shelf.geometry)[2:])
+                near = abs(weight - at.weight_g) < 4 * math.hypot(sd, at.weight_sd_g) + 0.02 * at.weight_g
+                if new.tag is None and near and abs(new.since - back) < _BROUGHT_S:
+                    del self._shelf.things[old.id]
+                    gone += [Vanished(now, old.id, at.weight_g, at.weight_sd_g), self.pin(now, new, old.tag)]
+                    break
+        return gone
 
     def _weigh_apart(self, thing: Thing, weight: KnownWeight) -> None:
         """The weight of a thing that came together with others tells about the others too."""
