@@ -20,6 +20,7 @@ from tms_agents.cabinet.weights import Weights, weights_path
 from tms_agents.devices.transport import DeviceState
 from tms_agents.running import Posted, Running, running
 from tms_client.cli import CommandError
+from tms_client.errors import SpoolError
 from tms_schemas.observation import Observation
 
 log = logging.getLogger(__name__)
@@ -43,8 +44,8 @@ async def run(
     ``clock`` gives Unix time, ``even`` seconds that never jump.
 
     Raises:
-        CommandError: a board of raw counts has no calibration.
-        SpoolError: the spool cannot be opened.
+        CommandError: a board of raw counts has no calibration, or a device needs an extra that is not installed.
+        SpoolError: the spool cannot be opened or written.
     """
     require_calibration(config, calibrations)
     posted = Posted()
@@ -55,6 +56,11 @@ async def run(
         work = _Work(config, cabinet, agent, clocks)
         try:
             await work.forever()
+        except ExceptionGroup as group:
+            for error in group.exceptions:
+                if isinstance(error, CommandError | SpoolError):  # something that a person can mend
+                    raise error from None
+            raise
         finally:
             await work.finish()
     return posted

@@ -56,6 +56,9 @@ class Shelf:
         """What a scale under all of it shows."""
         return float(self.grams().sum())
 
+    def noise(self, sd_g: float) -> float:
+        return float(self._random.normal(0, sd_g))
+
     def counts(self, _: float) -> list[float]:
         noisy = self.grams() + self.zero_g + self._random.normal(0, self.noise_g, 4)
         return list(noisy / GAIN + OFFSET)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,19 @@ def test_a_board_of_raw_counts_needs_a_calibration(tmp_path, capsys):
     (tmp_path / "cabinet.calibration.toml").write_text("[shelf]\ngain = [1.0]\noffset = [0.0]\n")
     assert cli.main(["agent", "cabinet", "--config", str(path)]) == 2
     assert "is for 1 cells, the board has 4" in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_one_line(tmp_path):
+    path = tmp_path / "cabinet.toml"
+    load = '{kind = "modbus", host = "127.0.0.1", port = 9, registers = [0, 2, 4, 6]}'
+    path.write_text(config_toml("lab", "http://127.0.0.1:9", load))
+    block = "import sys; sys.modules.update(dict.fromkeys(('pymodbus', 'numba', 'scipy', 'fastapi')))"
+    command = (
+        f"{block}; from tms_client.cli import main; sys.exit(main(['agent', 'cabinet', '--config', {str(path)!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 2 and "[modbus]" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
 
 
 def test_grams_need_none(tmp_path):
