@@ -21,10 +21,10 @@ from tms_client.answers import Location
 from tms_client.api import Api, Area
 from tms_client.connection import AsyncConnection, client_options
 from tms_client.delivery import Pace
-from tms_client.errors import NotFound, SpoolError, TownError
-from tms_client.flows import NO_RETRY, Flow, Retry
+from tms_client.errors import TownError
+from tms_client.flows import Flow, Retry
 from tms_client.grasping import Onto
-from tms_client.hands import AsyncHand, AsyncRunning, Hands, only_one, place
+from tms_client.hands import AsyncHand, AsyncRunning, Hands, only_one, place, plan
 from tms_client.live import Endpoint, LiveFrame, follow_async, subscription
 from tms_client.posting import AsyncPoster
 from tms_client.spool import Spool
@@ -165,7 +165,7 @@ class AsyncTown:
             elif running.hands.room != room:
                 raise TownError(f"agent {agent} works in room {running.hands.room!r}, not in {room!r}")
             running.names.add(name)
-        return AsyncHand(running.hands, running.poster, name)
+        return AsyncHand(running.hands, running.poster.wake, name)
 
     async def grasped(
         self,
@@ -218,31 +218,14 @@ class AsyncTown:
     async def _open(
         self, agent: str, room: str, spool: Spool | Path | str, heartbeat_s: float, clock: Callable[[], float]
     ) -> AsyncRunning:
-        plan: Room | None
-        try:
-            plan = await self._run(Api(NO_RETRY).room(room))
-        except NotFound:
-            raise
-        except TownError:  # no server now, or no right to look: what the spool remembers of the room will do
-            plan = None
-        own = None if isinstance(spool, Spool) else await asyncio.to_thread(Spool, spool, agent, clock=clock)
-        used = own if own is not None else spool
-        assert isinstance(used, Spool)
-        try:
-            if used.agent != agent:
-                raise SpoolError(f"the spool is that of agent {used.agent!r}, not {agent!r}")
-            hands = await asyncio.to_thread(Hands, used, room, plan, clock=clock)
-        except BaseException:
-            if own is not None:
-                own.close()
-            raise
-        running = AsyncRunning(hands, self.poster(used, room), own_spool=own is not None, heartbeat_s=heartbeat_s)
+        hands = await asyncio.to_thread(Hands.open, spool, agent, room, await self._run(plan(room)), clock=clock)
+        running = AsyncRunning(hands, self.poster(hands.spool, room), heartbeat_s=heartbeat_s)
         await running.start()
         return running
 
     def _hand(self, name: str) -> AsyncHand:
         running = only_one(self._agents, name)
-        return AsyncHand(running.hands, running.poster, name)
+        return AsyncHand(running.hands, running.poster.wake, name)
 
     async def _run(self, flow: Flow[T]) -> T:
         return await self._connection.run(flow)

@@ -7,14 +7,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from datetime import UTC, datetime
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Concatenate, Literal, ParamSpec
 
-from tms_client.errors import SpoolError, SpoolFull, TownError
+from tms_client.api import Api
+from tms_client.errors import NotFound, SpoolError, SpoolFull, TownError
+from tms_client.flows import NO_RETRY, Flow
 from tms_client.grasping import Gripper, Held, Onto, Table
 from tms_client.posting import AsyncPoster, Poster
 from tms_client.spool import Spool
@@ -25,6 +29,7 @@ from tms_schemas.rooms import Room
 
 #: Seconds at the end for what still waits in the spool; the rest stays there.
 _DRAIN_S = 2.0
+P = ParamSpec("P")
 Verb = Callable[[Gripper, datetime], list[Observation]]
 
 
@@ -59,6 +64,7 @@ class Hands:
 
     def __init__(self, spool: Spool, room: str, plan: Room | None, *, clock: Callable[[], float] = time.time) -> None:
         self.spool, self.room, self._clock = spool, room, clock
+        self._own_spool = False
         self._lock = threading.RLock()
         self._table = Table()
         self._grippers: dict[str, Gripper] = {}
@@ -79,6 +85,32 @@ class Hands:
             AgentState(seq=0, observed_at=at, state="connected"),
             keep={"watched": self._watched.model_dump_json(), "hands": json.dumps(self._state())},
         )
+
+    @classmethod
+    def open(
+        cls, spool: Spool | Path | str, agent: str, room: str, plan: Room | None, *, clock: Callable[[], float]
+    ) -> Hands:
+        """Over this spool, or over this file: then ``close`` closes it.
+
+        Raises:
+            SpoolError: the spool belongs to another agent, or is open elsewhere.
+        """
+        if isinstance(spool, Spool):
+            if spool.agent != agent:
+                raise SpoolError(f"the spool is that of agent {spool.agent!r}, not {agent!r}")
+            return cls(spool, room, plan, clock=clock)
+        own = Spool(spool, agent, clock=clock)
+        try:
+            hands = cls(own, room, plan, clock=clock)
+        except BaseException:
+            own.close()
+            raise
+        hands._own_spool = True
+        return hands
+
+    def close(self) -> None:
+        if self._own_spool:
+            self.spool.close()
 
     def now(self) -> datetime:
         return datetime.fromtimestamp(self._clock(), UTC)
@@ -147,8 +179,8 @@ class Hand:
     happened then.
     """
 
-    def __init__(self, hands: Hands, poster: Poster, name: str) -> None:
-        self._hands, self._poster, self.name = hands, poster, name
+    def __init__(self, hands: Hands, wake: Callable[[], object], name: str) -> None:
+        self._hands, self._wake, self.name = hands, wake, name
 
     @property
     def held(self) -> Held | None:
@@ -195,7 +227,7 @@ class Hand:
         furniture; smart cabinets are watched, and the floor where the room has a floor sensor.
         """
         self._hands.release(self.name, when, xy, kind, surface, watched, z=z, cov=cov)
-        self._poster.wake()
+        self._wake()
 
     def lost(self, xy: Xy | None = None, *, when: datetime | None = None) -> None:
         """The thing fell out of the hand, or was taken; ``xy`` is where the hand was."""
@@ -203,72 +235,46 @@ class Hand:
 
     def _act(self, when: datetime | None, verb: Verb) -> None:
         self._hands.act(self.name, when, verb)
-        self._poster.wake()
+        self._wake()
+
+
+def _in_a_thread(
+    method: Callable[Concatenate[Hand, P], None],
+) -> Callable[Concatenate[AsyncHand, P], Coroutine[Any, Any, None]]:
+    """The same method to be awaited, with the same arguments."""
+
+    async def awaited(self: AsyncHand, /, *args: P.args, **kwargs: P.kwargs) -> None:
+        await asyncio.to_thread(method, self._hand, *args, **kwargs)
+
+    functools.update_wrapper(awaited, method)
+    return awaited
 
 
 class AsyncHand:
     """``Hand`` for asyncio: the same methods, awaited; the disk is touched in worker threads only."""
 
-    def __init__(self, hands: Hands, poster: AsyncPoster, name: str) -> None:
-        self._hands, self._poster, self.name = hands, poster, name
+    def __init__(self, hands: Hands, wake: Callable[[], object], name: str) -> None:
+        loop = asyncio.get_running_loop()  # the poster belongs to it
+        self._hand = Hand(hands, lambda: loop.call_soon_threadsafe(wake), name)
+        self.name = name
 
     @property
     def held(self) -> Held | None:
         """What is in the hand."""
-        return self._hands.held(self.name)
+        return self._hand.held
 
-    async def grasped(
-        self,
-        tag: str | None,
-        xy: Xy,
-        *,
-        z: float | None = None,
-        cov: Covariance | None = None,
-        weight_g: float | None = None,
-        when: datetime | None = None,
-    ) -> None:
-        """A thing was lifted. ``tag`` None: what it is was not read."""
-        await self._act(when, lambda g, at: g.grasped(at, xy, tag=tag, z=z, cov=cov, weight_g=weight_g))
-
-    async def read(self, tag: str, *, when: datetime | None = None) -> None:
-        """The hand's reader reads the tag of what is held: later than the grasp, or once more."""
-        await self._act(when, lambda g, at: g.read(at, tag))
-
-    async def moved(
-        self, xy: Xy, *, z: float | None = None, cov: Covariance | None = None, when: datetime | None = None
-    ) -> None:
-        """The hand is there now; call it as often as you like."""
-        await self._act(when, lambda g, at: g.moved(at, xy, z=z, cov=cov))
-
-    async def released(
-        self,
-        xy: Xy,
-        *,
-        surface: str | None = None,
-        kind: Onto = "table",
-        z: float | None = None,
-        cov: Covariance | None = None,
-        watched: bool | None = None,
-        when: datetime | None = None,
-    ) -> None:
-        """The thing was put down; see ``Hand.released``."""
-        await asyncio.to_thread(self._hands.release, self.name, when, xy, kind, surface, watched, z=z, cov=cov)
-        self._poster.wake()
-
-    async def lost(self, xy: Xy | None = None, *, when: datetime | None = None) -> None:
-        """The thing fell out of the hand, or was taken; ``xy`` is where the hand was."""
-        await self._act(when, lambda g, at: g.dropped(at, xy))
-
-    async def _act(self, when: datetime | None, verb: Verb) -> None:
-        await asyncio.to_thread(self._hands.act, self.name, when, verb)
-        self._poster.wake()
+    grasped = _in_a_thread(Hand.grasped)
+    read = _in_a_thread(Hand.read)
+    moved = _in_a_thread(Hand.moved)
+    released = _in_a_thread(Hand.released)
+    lost = _in_a_thread(Hand.lost)
 
 
 class Running:
     """An agent whose hands are open: its spool, its poster in the background, its sign of life."""
 
-    def __init__(self, hands: Hands, poster: Poster, *, own_spool: bool, heartbeat_s: float) -> None:
-        self.hands, self.poster, self._own_spool, self._heartbeat_s = hands, poster, own_spool, heartbeat_s
+    def __init__(self, hands: Hands, poster: Poster, *, heartbeat_s: float) -> None:
+        self.hands, self.poster, self._heartbeat_s = hands, poster, heartbeat_s
         self.names: set[str] = set()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._beat, name=f"heartbeat of {hands.spool.agent}", daemon=True)
@@ -286,8 +292,7 @@ class Running:
         while len(self.hands.spool) and self.poster.trouble is None and time.monotonic() < until:
             time.sleep(0.02)
         self.poster.__exit__()
-        if self._own_spool:
-            self.hands.spool.close()
+        self.hands.close()
 
     def _beat(self) -> None:
         while not self._stop.wait(self._heartbeat_s):
@@ -298,8 +303,8 @@ class Running:
 class AsyncRunning:
     """``Running`` for asyncio."""
 
-    def __init__(self, hands: Hands, poster: AsyncPoster, *, own_spool: bool, heartbeat_s: float) -> None:
-        self.hands, self.poster, self._own_spool, self._heartbeat_s = hands, poster, own_spool, heartbeat_s
+    def __init__(self, hands: Hands, poster: AsyncPoster, *, heartbeat_s: float) -> None:
+        self.hands, self.poster, self._heartbeat_s = hands, poster, heartbeat_s
         self.names: set[str] = set()
 
     async def start(self) -> None:
@@ -313,14 +318,27 @@ class AsyncRunning:
         await asyncio.to_thread(self.hands.tell, "silent", "the agent ended")
         await self.poster.drain(_DRAIN_S)
         await self.poster.__aexit__(None, None, None)
-        if self._own_spool:
-            self.hands.spool.close()
+        self.hands.close()
 
     async def _beat(self) -> None:
         while True:
             await asyncio.sleep(self._heartbeat_s)
             await asyncio.to_thread(self.hands.tell, "connected")
             self.poster.wake()
+
+
+def plan(room: str) -> Flow[Room | None]:
+    """The room as the server has it, asked once; None where it cannot say: what the spool remembers will do then.
+
+    Raises:
+        NotFound: there is no such room.
+    """
+    try:
+        return (yield from Api(NO_RETRY).room(room))
+    except NotFound:
+        raise
+    except TownError:  # no server now, or no right to look
+        return None
 
 
 def only_one(agents: dict[str, Any], hand: str) -> Any:

@@ -21,10 +21,10 @@ from tms_client.answers import Location
 from tms_client.api import Api, Area
 from tms_client.connection import Connection, client_options
 from tms_client.delivery import Pace
-from tms_client.errors import NotFound, SpoolError, TownError
-from tms_client.flows import NO_RETRY, Flow, Retry
+from tms_client.errors import TownError
+from tms_client.flows import Flow, Retry
 from tms_client.grasping import Onto
-from tms_client.hands import Hand, Hands, Running, only_one, place
+from tms_client.hands import Hand, Hands, Running, only_one, place, plan
 from tms_client.live import Endpoint, LiveFrame, follow, subscription
 from tms_client.posting import Poster
 from tms_client.spool import Spool
@@ -164,7 +164,7 @@ class Town:
             elif running.hands.room != room:
                 raise TownError(f"agent {agent} works in room {running.hands.room!r}, not in {room!r}")
             running.names.add(name)
-        return Hand(running.hands, running.poster, name)
+        return Hand(running.hands, running.poster.wake, name)
 
     def grasped(
         self,
@@ -217,29 +217,12 @@ class Town:
     def _open(
         self, agent: str, room: str, spool: Spool | Path | str, heartbeat_s: float, clock: Callable[[], float]
     ) -> Running:
-        plan: Room | None
-        try:
-            plan = self._run(Api(NO_RETRY).room(room))
-        except NotFound:
-            raise
-        except TownError:  # no server now, or no right to look: what the spool remembers of the room will do
-            plan = None
-        own = None if isinstance(spool, Spool) else Spool(spool, agent, clock=clock)
-        used = own if own is not None else spool
-        assert isinstance(used, Spool)
-        try:
-            if used.agent != agent:
-                raise SpoolError(f"the spool is that of agent {used.agent!r}, not {agent!r}")
-            hands = Hands(used, room, plan, clock=clock)
-            return Running(hands, self.poster(used, room), own_spool=own is not None, heartbeat_s=heartbeat_s)
-        except BaseException:
-            if own is not None:
-                own.close()
-            raise
+        hands = Hands.open(spool, agent, room, self._run(plan(room)), clock=clock)
+        return Running(hands, self.poster(hands.spool, room), heartbeat_s=heartbeat_s)
 
     def _hand(self, name: str) -> Hand:
         running = only_one(self._agents, name)
-        return Hand(running.hands, running.poster, name)
+        return Hand(running.hands, running.poster.wake, name)
 
     def _run(self, flow: Flow[T]) -> T:
         return self._connection.run(flow)
