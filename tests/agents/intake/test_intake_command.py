@@ -13,6 +13,8 @@ from server_process import ServerProcess
 
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.llrp.emulator import LlrpEmulator
+from tms_agents.devices.text_reader_emulator import TextReaderDevice
+from tms_agents.devices.thingmagic.emulator import ThingMagicDevice
 from tms_agents.devices.tr3.emulator import Tr3Device
 from tms_client import cli
 
@@ -274,3 +276,41 @@ async def test_a_uhf_reader_and_a_scanner_on_the_network(carer, configure):
         scanner.inject(TEA.encode() + b"\r")
         await screen.sees("Registered: .* tag E28011700000020A1B2C3D4E")
         assert (await screen.presses_ctrl_c())[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("section", "form", "tag"),
+    [
+        ('kind = "text-serial"', "lines", TAG.format(0x41)),
+        ('kind = "text-serial"\nform = "rdm6300"', "rdm6300", "0A1B2C3D4E"),
+        ('kind = "text-tcp"\norder = "reversed"', "lines", TAG.format(0x42)),
+    ],
+)
+async def test_readers_that_print(carer, configure, town, section, form, tag):
+    device = TextReaderDevice(form, before="UID: ")
+    async with PtyLine(device, tick_s=0.05) if "serial" in section else TcpLine(device, tick_s=0.05) as line:
+        where = f'device = "{line.path}"' if isinstance(line, PtyLine) else f'host = "{line.host}"\nport = {line.port}'
+        screen = carer("--config", configure(f"settle_s = 0.2\n[reader]\n{section}\n{where}"), "--room", "lab")
+        await screen.sees("The reader is ready")
+        screen.type(TEA)
+        await screen.sees("Now hold the thing")
+        device.tags.append(bytes.fromhex(tag)[::-1].hex() if "reversed" in section else tag)
+        await screen.sees(f"Registered: お茶 .* tag {tag}, room lab")
+        assert await screen.presses_ctrl_c() == (0, "1 thing registered.")
+    assert town.objects.get(tag).jan == TEA
+
+
+@pytest.mark.parametrize("mode", ["multiple", "single"])
+async def test_a_thingmagic_module(carer, configure, town, mode):
+    device, tag = ThingMagicDevice(), f"E2801170000002{mode.encode().hex()[:10].upper()}"
+    async with PtyLine(device) as line:
+        reader = f'kind = "thingmagic"\ndevice = "{line.path}"\nmode = "{mode}"\nread_ms = 30\npoll_s = 0.05'
+        screen = carer("--config", configure(f"settle_s = 0.2\ngone_s = 0.5\n[reader]\n{reader}"), "--room", "lab")
+        await screen.sees("The reader is ready")
+        device.see(tag)
+        await screen.sees(f"Tag {tag}. Now scan")
+        device.lose(tag)
+        screen.type(CUP)
+        await screen.sees(f"Registered: cup, tag {tag}, room lab")
+        assert await screen.presses_ctrl_c() == (0, "1 thing registered.")
+    assert town.objects.get(tag).jan == CUP
