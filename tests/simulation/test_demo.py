@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +17,9 @@ import httpx
 import pytest
 from server_process import ServerProcess
 
+from tms_agents.simulation.catalogue import ITEMS
 from tms_agents.simulation.demo import Plan, run
+from tms_agents.simulation.room import START, new_world
 from tms_agents.simulation.terminal import Terminal
 from tms_client import Town
 
@@ -43,57 +48,84 @@ class Recorder(Terminal):
         super().pies(found, off)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_the_pies_are_those_of_the_paper(tmp_path: Path, seed: int) -> None:
+def test_the_pies_are_those_of_the_paper(tmp_path: Path) -> None:
     terminal = Recorder()
     with ServerProcess(tmp_path) as server:
-        assert run(Plan(url=server.url, once=True, speed=20.0, seed=seed), terminal)
+        assert run(Plan(url=server.url, once=True, speed=20.0), terminal)
         with Town(server.url) as town:
             objects = list(town.objects.search(room="demo"))
             assert len(objects) == 10
             assert all(one.weight_g is None and one.size_m is None for one in objects)
             assert town.where("お茶").name == "Tea bottle"
             assert not list(town.unknown_tags("demo"))
+            assert town.anomalies("demo").anomalies == []
+            assert_measured(town)
     for step, (found, wanted) in enumerate(zip(terminal.found, FIGURE_8, strict=True)):
         for number, pie in wanted.items():
             for place, p in pie.items():
                 assert found[number][place] == pytest.approx(p, abs=0.02), f"step {step}, object {number}, {place}"
 
 
-def test_weight_knows_before_the_tag_is_read(tmp_path: Path) -> None:
-    terminal = Recorder()
-    with ServerProcess(tmp_path) as server:
-        assert run(Plan(url=server.url, once=True, speed=20.0, weights=True), terminal)
-        with Town(server.url) as town:
-            assert {one.weight_g for one in town.objects.search(room="demo")} >= {541.0, 318.0}
-    before_the_read = terminal.found[5]
-    assert before_the_read[4]["cabinet B"] == pytest.approx(1.0, abs=0.02)
-    assert before_the_read[3]["floor"] == pytest.approx(1.0, abs=0.02)
+def assert_measured(town: Town) -> None:
+    """Things are told where they stand, as far as boards and arm can tell."""
+    world = new_world()
+    for cabinet, numbers in START.items():
+        for slot, number in enumerate(numbers):
+            if number in (2, 3, 4):
+                continue
+            best = town.where(ITEMS[number].tag).best
+            assert best is not None and best.xy is not None and best.cov is not None
+            off = math.dist(best.xy, world.cabinets[cabinet].slots[slot])
+            assert 0.0 < off < 0.06  # a light thing on a board one and a half metres long
+    mug = town.where(ITEMS[2].tag).best
+    assert mug is not None and mug.xy is not None
+    assert math.dist(mug.xy, (4.3, 2.5)) < 0.03, "forward kinematics of the arm"
 
 
-@pytest.mark.parametrize("more", [[], ["--weights"]])
-def test_once_leaves_after_the_story_and_writes_plain_text(tmp_path: Path, more: list[str]) -> None:
-    done = tms_demo("--once", "--speed", "20", "--data-dir", str(tmp_path), *more)
-    out, err = done.communicate(timeout=120)
-    assert done.returncode == 0, err
+def test_once_leaves_after_the_story_and_weight_knows_before_the_tag_is_read(tmp_path: Path) -> None:
+    done = tms_demo("--once", "--speed", "20", "--data-dir", str(tmp_path), "--weights", "--seed", "1")
+    out, err = done.communicate(timeout=150)
+    assert done.returncode == 0, out + err
     assert "Traceback" not in err
     assert out.startswith("The page: http://127.0.0.1:")
     assert "\x1b" not in out
     assert out.count("Tea bottle") == 7
+    assert "Every pie is as weighing tells, within 0.02." in out
+    before_the_read = out[out.index("\n(5)") : out.index("\n(6)")]
+    assert re.search(r"Medicine box .* cabinet B (99|100) %", before_the_read)
+    assert re.search(r"Tea bottle .* floor (9[89]|100) %", before_the_read)
     assert_stopped(out)
 
 
-def test_ctrl_c_leaves_cleanly_and_stops_the_server(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_cleanly_and_stops_server_and_agents(tmp_path: Path) -> None:
     demo = tms_demo("--speed", "20", "--data-dir", str(tmp_path))
     assert demo.stdout is not None
-    out = demo.stdout.readline()
+    out = ""
     for line in demo.stdout:
-        if "lives on" in line:
+        out += line
+        if line.startswith("(0)"):
             break
+    assert len(running(out)) == 4
     demo.send_signal(signal.SIGINT)
     rest, err = demo.communicate(timeout=60)
     assert demo.returncode == 0
     assert "Traceback" not in rest + err
+    assert_stopped(out)
+
+
+def test_an_agent_that_dies_is_named(tmp_path: Path) -> None:
+    demo = tms_demo("--once", "--data-dir", str(tmp_path))
+    assert demo.stdout is not None
+    out = ""
+    for line in demo.stdout:
+        out += line
+        if line.startswith("Things are put"):
+            break
+    cabinet_b = [number for number, command in running(out).items() if "cabinet-b" in command]
+    os.kill(cabinet_b[0], signal.SIGKILL)
+    _, err = demo.communicate(timeout=60)
+    assert demo.returncode == 2
+    assert "tms: agent cabinet-b ended with status -9" in err
     assert_stopped(out)
 
 
@@ -115,7 +147,21 @@ def tms_demo(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
+def running(out: str) -> dict[int, str]:
+    """The processes of the agents that the demo named, by their numbers."""
+    configs = re.findall(r"tms agent \w+ --config (\S+)", out)
+    assert len(configs) == 4
+    found = {}
+    for entry in Path("/proc").iterdir():
+        with contextlib.suppress(OSError):
+            command = (entry / "cmdline").read_text().replace("\0", " ")
+            if entry.name.isdigit() and any(f"--config {config} " in command for config in configs):
+                found[int(entry.name)] = command
+    return found
+
+
 def assert_stopped(out: str) -> None:
+    assert running(out) == {}
     url = out.splitlines()[0].removeprefix("The page: ")
     with pytest.raises(httpx.TransportError):
         httpx.get(url + "healthz", timeout=2.0)

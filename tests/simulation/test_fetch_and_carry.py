@@ -5,16 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from server_process import ServerProcess
 
 from tms_agents.simulation.demo import Plan, register
-from tms_agents.simulation.player import Player, posted
-from tms_agents.simulation.room import new_world
-from tms_agents.simulation.story import STEPS
+from tms_agents.simulation.stage import staged
+from tms_agents.simulation.story import STEPS, furnish
 from tms_client import Town
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "fetch_and_carry.py"
@@ -26,12 +24,10 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("fetch")
     with ServerProcess(folder) as server, Town(server.url) as town:
         register(town, Plan())
-        with posted(town, "demo", folder / "spools", 0, weigh=False) as (agents, posters):
-            player = Player(new_world(), agents, speed=20.0, clock=lambda: datetime.now(UTC))
-            player.switch_on()
+        with staged(town, server.url, None, "demo", folder, seed=0, speed=20.0) as (_, player):
+            player.play(furnish(player.world))
             for step in STEPS[:4]:
                 player.play(step.act(player.world))
-            assert all(poster.drain(30.0) for poster in posters)
         yield server.url
 
 

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -18,10 +17,11 @@ from server_process import ServerProcess
 
 from tms_agents.simulation.catalogue import ITEMS
 from tms_agents.simulation.demo import Plan, register
-from tms_agents.simulation.player import Player, posted
-from tms_agents.simulation.room import description, new_world
-from tms_agents.simulation.story import STEPS, Step
-from tms_client import Poster, Town
+from tms_agents.simulation.player import Player
+from tms_agents.simulation.room import description
+from tms_agents.simulation.stage import staged
+from tms_agents.simulation.story import STEPS, Step, furnish
+from tms_client import Town
 
 from .conftest import Watched
 
@@ -29,23 +29,21 @@ from .conftest import Watched
 class Story:
     """The experiment, one step at a time."""
 
-    def __init__(self, player: Player, posters: list[Poster]) -> None:
-        self._player, self._posters = player, posters
+    def __init__(self, player: Player) -> None:
+        self._player = player
 
     def play(self, *steps: Step) -> None:
         for step in steps:
             self._player.play(step.act(self._player.world))
-        assert all(poster.drain(30.0) for poster in self._posters)
 
 
 @contextmanager
 def story(url: str, folder: Path) -> Iterator[Story]:
     with Town(url) as town:
         register(town, Plan())
-        with posted(town, "demo", folder / "spools", 0, weigh=False) as (agents, posters):
-            player = Player(new_world(), agents, speed=10.0, clock=lambda: datetime.now(UTC))
-            player.switch_on()
-            yield Story(player, posters)
+        with staged(town, url, None, "demo", folder, seed=0, speed=10.0) as (_, player):
+            player.play(furnish(player.world))
+            yield Story(player)
 
 
 def test_the_experiment_is_seen_as_it_happens(server: ServerProcess, watched: Watched, tmp_path: Path) -> None:

@@ -23,7 +23,11 @@ def main(argv: Sequence[str]) -> int:
         "--weights", action="store_true", help="register and measure weights: how much sooner they know"
     )
     parser.add_argument(
-        "--speed", type=_speed, default=1.0, help="room seconds per second (default 1: a story of 40 s)"
+        "--speed",
+        type=_speed,
+        default=1.0,
+        metavar="S",
+        help="people and robot move S times faster (default 1); boards, readers and agents keep real time",
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the sensors' noise (default 0)")
     parser.add_argument("--url", help="use this running server instead of starting one")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import tempfile
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +14,15 @@ import numpy as np
 from tms_agents.simulation import pies
 from tms_agents.simulation.catalogue import ITEMS
 from tms_agents.simulation.idle import afternoon
-from tms_agents.simulation.player import Player, posted
-from tms_agents.simulation.room import description, new_world
-from tms_agents.simulation.sensors import READ_S
+from tms_agents.simulation.player import Player
+from tms_agents.simulation.room import description
 from tms_agents.simulation.service import server
-from tms_agents.simulation.story import MOVED, STEPS
+from tms_agents.simulation.stage import UTC_NOW, staged
+from tms_agents.simulation.story import MOVED, STEPS, furnish
 from tms_agents.simulation.terminal import Terminal
-from tms_client import Poster, Retry, Town, TownError
+from tms_client import Retry, Town, TownError
 from tms_client.cli import CommandError
 from tms_schemas.objects import ObjectFields, ProductIn
-
-DELIVERY_S = 60.0
-UTC_NOW = functools.partial(datetime.now, UTC)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -57,9 +52,13 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
         town = stack.enter_context(Town(url, plan.key, retry=Retry(attempts=8)))
         try:
             register(town, plan)
-            watched, posters = stack.enter_context(posted(town, plan.room, work, plan.seed, weigh=plan.weights))
-            player = Player(new_world(), watched, speed=plan.speed, clock=clock)
-            right = _story(town, player, posters, plan, terminal)
+            terminal.say("starting the agents ...")
+            stage, player = stack.enter_context(
+                staged(town, url, plan.key, plan.room, work, seed=plan.seed, speed=plan.speed, clock=clock)
+            )
+            terminal.devices(stage.hardware.plugs, stage.configs)
+            player.play(furnish(player.world))
+            right = _story(town, player, plan, terminal)
             if not plan.once:
                 terminal.say(f"\nThe room lives on; look at {url}/ (Ctrl-C ends it).")
                 player.play(afternoon(player.world, np.random.default_rng(plan.seed)))
@@ -80,13 +79,11 @@ def register(town: Town, plan: Plan) -> None:
         )
 
 
-def _story(town: Town, player: Player, posters: list[Poster], plan: Plan, terminal: Terminal) -> bool:
+def _story(town: Town, player: Player, plan: Plan, terminal: Terminal) -> bool:
     wrong = 0
-    player.switch_on()
     for number, step in enumerate(STEPS):
         terminal.step(number, step.title)
         player.play(step.act(player.world))
-        _delivered(posters)
         found = pies.pies_of(town.placements(plan.room), MOVED)
         off = pies.differences(step.expected(plan.weights), found)
         terminal.pies(found, off)
@@ -94,17 +91,7 @@ def _story(town: Town, player: Player, posters: list[Poster], plan: Plan, termin
     terminal.verdict(wrong, weighed=plan.weights)
     if plan.weights:
         terminal.say(
-            f"Weight told objects 3 and 4 apart in step (5), {READ_S:.1f} s before the tag was read; "
+            "Weight told objects 3 and 4 apart in step (5), before the tag was read; "
             "without it both are 1/2 - 1/2 until then."
         )
     return wrong == 0
-
-
-def _delivered(posters: list[Poster]) -> None:
-    """Wait until the server has acknowledged everything observed so far."""
-    deadline = time.monotonic() + DELIVERY_S
-    while waiting := [poster for poster in posters if len(poster.spool)]:
-        if time.monotonic() > deadline:
-            first = waiting[0]
-            raise CommandError(f"agent {first.spool.agent} cannot deliver: {first.trouble or 'no answer'}")
-        time.sleep(0.01)

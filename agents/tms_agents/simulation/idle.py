@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tms_agents.simulation.room import PERSON, ROBOT
-from tms_agents.simulation.story import Script, wait, walk
+from tms_agents.simulation.script import Script, Told, wait, walk
 from tms_agents.simulation.world import InCabinet, World
 
 _FRONTS = {"cabinet-a": "front of A", "cabinet-b": "front of B", "cabinet-c": "front of C"}
@@ -33,7 +33,8 @@ def afternoon(world: World, rng: np.random.Generator) -> Script:
         there = str(rng.choice([cabinet for cabinet in _FRONTS if world.free_slots(cabinet)]))
         yield from walk(world, PERSON, here, _FRONTS[place.cabinet])
         world.take(PERSON, tag)
-        yield from wait(world, 1.5)
+        yield Told(or_go_on=True)
         yield from walk(world, PERSON, _FRONTS[place.cabinet], _FRONTS[there])
         world.put(PERSON, tag, there, world.free_slots(there)[0])
+        yield Told(or_go_on=True)
         here = _FRONTS[there]

@@ -1,40 +1,47 @@
-"""Plays scripts in the simulated room: the world moves, the sensor agents look, their posters deliver."""
+"""Plays scripts in the simulated room: the world moves, devices follow, the floor sensor looks."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from datetime import datetime, timedelta
-from pathlib import Path
-from typing import NamedTuple
+from typing import Protocol
 
-import numpy as np
-
-from tms_agents.simulation.room import CABINETS, FLOOR_AGENT, ROBOT, ROBOT_AGENT
-from tms_agents.simulation.sensors import CabinetAgent, FloorAgent, RobotAgent, SensorAgent
-from tms_agents.simulation.story import Script
+from tms_agents.simulation.floor import FloorAgent
+from tms_agents.simulation.script import Firm, Script, Told
 from tms_agents.simulation.world import World
-from tms_client import Pace, Poster, Spool, Town
+from tms_client.cli import CommandError
 from tms_schemas.observation import Observation
 
 STEP_S = 0.1
-#: Takes the observations of one agent.
-Sink = Callable[[list[Observation]], None]
+#: Real seconds between two looks at what the agents told, and after which an agent is late.
+LOOK_S, LATE_S = 0.05, 60.0
 
 
-class Watched(NamedTuple):
-    agent: SensorAgent
-    sink: Sink
+class Senses(Protocol):
+    """Devices, their agents, and what the server heard of them."""
+
+    def follow(self, world: World) -> None:
+        """What just happened in the room happens at the devices."""
+
+    def floor(self, observations: list[Observation]) -> None:
+        """The floor sensor observed."""
+
+    def late(self, world: World, wish: Told | Firm) -> str | None:
+        """Who has not yet done what ``wish`` waits for, and what, in words."""
 
 
 class Player:
-    """One world and the agents that watch it; ``speed`` room seconds pass in one second of the clock."""
+    """One world and its sensors; ``speed`` room seconds pass in one second of the clock.
+
+    While a script waits for the agents the room stands still: devices take their own time.
+    """
 
     def __init__(
         self,
         world: World,
-        watched: list[Watched],
+        floor: FloorAgent,
+        senses: Senses,
         *,
         speed: float,
         clock: Callable[[], datetime],
@@ -42,67 +49,58 @@ class Player:
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.world = world
-        self._watched = watched
-        self._speed = speed
+        self._floor, self._senses, self._speed = floor, senses, speed
         self._clock, self._sleep, self._monotonic = clock, sleep, monotonic
         self._anchor = (clock(), world.time_s)
 
     @property
     def now(self) -> datetime:
-        """The time of the sensors' clocks."""
+        """The time of the floor sensor's clock."""
         since, at_s = self._anchor
         return since + timedelta(seconds=(self.world.time_s - at_s) / self._speed)
 
     def switch_on(self) -> None:
-        """Every agent sends its inventory."""
+        """The floor sensor sends its inventory; the other agents do so by themselves."""
         self._set_clocks()
-        for agent, sink in self._watched:
-            sink(agent.start(self.world, self.now))
+        self._senses.follow(self.world)
+        self._senses.floor(self._floor.start(self.world, self.now))
 
     def play(self, script: Script) -> None:
-        """Run a script to its end; the agents look after every step of time."""
+        """Run a script to its end.
+
+        Raises:
+            CommandError: an agent is late; the message names it.
+        """
         self._set_clocks()
         due = self._monotonic()
-        for _ in script:
-            self.world.step(STEP_S)
-            for agent, sink in self._watched:
-                if observations := agent.look(self.world, self.now):
-                    sink(observations)
-            due += STEP_S / self._speed
-            self._sleep(max(0.0, due - self._monotonic()))
+        for wish in script:
+            if wish is None:
+                self.world.step(STEP_S)
+                self._look()
+                due += STEP_S / self._speed
+                self._sleep(max(0.0, due - self._monotonic()))
+            else:
+                self._wait(wish)
+                due = self._monotonic()
+
+    def _wait(self, wish: Told | Firm) -> None:
+        patience = self._monotonic() + LATE_S
+        self._look()
+        while (late := self._senses.late(self.world, wish)) is not None:
+            if self._monotonic() > patience:
+                if isinstance(wish, Told) and wish.or_go_on:
+                    break
+                raise CommandError(f"{late}, for {LATE_S:.0f} s")
+            self._sleep(LOOK_S)
+            self._set_clocks()
+            self._look()
+        self._set_clocks()
+
+    def _look(self) -> None:
+        self._senses.follow(self.world)
+        if found := self._floor.look(self.world, self.now):
+            self._senses.floor(found)
 
     def _set_clocks(self) -> None:
         """The room stands still between two scripts, clocks do not; they never go back."""
         self._anchor = (max(self.now, self._clock()), self.world.time_s)
-
-
-def agents(
-    seed: int, *, weigh: bool, new_label: Callable[[str], Callable[[], str] | None] = lambda _: None
-) -> list[SensorAgent]:
-    """All sensor agents of the room; ``new_label`` gives each, by its name, the source of its label ids."""
-    names = [*(cabinet.id for cabinet in CABINETS), FLOOR_AGENT, ROBOT_AGENT]
-    streams = dict(zip(names, np.random.default_rng(seed).spawn(len(names)), strict=True))
-    return [
-        *(CabinetAgent(one, streams[one.id], new_label(one.id), weigh=weigh) for one in CABINETS),
-        FloorAgent(FLOOR_AGENT, streams[FLOOR_AGENT], new_label(FLOOR_AGENT)),
-        RobotAgent(ROBOT_AGENT, ROBOT, streams[ROBOT_AGENT], new_label(ROBOT_AGENT)),
-    ]
-
-
-@contextmanager
-def posted(
-    town: Town, room: str, spools: Path, seed: int, *, weigh: bool
-) -> Iterator[tuple[list[Watched], list[Poster]]]:
-    """The agents, each with a durable spool and a poster of its own to the server."""
-    with ExitStack() as stack:
-        posters: dict[str, Poster] = {}
-        for agent in (*(cabinet.id for cabinet in CABINETS), FLOOR_AGENT, ROBOT_AGENT):
-            spool = stack.enter_context(Spool(spools / f"{agent}.sqlite", agent))
-            poster = posters[agent] = town.poster(spool, room, pace=Pace(linger_s=0.02))
-            poster.drain()  # agrees with the server on the numbers to go on with
-            stack.enter_context(poster)
-        watched = [
-            Watched(agent, lambda found, poster=posters[agent.agent]: poster.post(*found))  # type: ignore[misc]
-            for agent in agents(seed, weigh=weigh, new_label=lambda name: posters[name].spool.new_label)
-        ]
-        yield watched, list(posters.values())

@@ -14,25 +14,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
 from tms_agents.simulation.catalogue import ITEMS
-from tms_agents.simulation.world import Cabinet, InCabinet, Mover, World, Xy
-from tms_schemas.rooms import Furniture, RoomIn, Sensor, Surface
+from tms_agents.simulation.world import Cabinet, Mover, Outside, World, Xy
+from tms_schemas.rooms import Furniture, RoomIn, Sensor, Surface, Zone
 
 PERSON, ROBOT = "person", "robot"
-TABLE_SURFACE = "table/top"
+TABLE_SURFACE, TABLE_Z = "table/top", 0.7
 FLOOR_AGENT, ROBOT_AGENT = "floor", "robot"
 #: Where the things of the experiment are at its start: cabinet -> numbers of the objects, slot by slot.
 START: Mapping[str, tuple[int, ...]] = {"cabinet-a": (0, 1, 2, 3), "cabinet-b": (4, 5, 6), "cabinet-c": (7, 8, 9)}
 
+
+def _cabinet(letter: str, corner: Xy, theta: float) -> Cabinet:
+    return Cabinet(
+        id=f"cabinet-{letter.lower()}",
+        name=f"Cabinet {letter}",
+        corner=corner,
+        theta=theta,
+        width=1.45,
+        depth=0.46,
+        spots=tuple((0.21 + 0.26 * i, 0.23) for i in range(5)),
+    )
+
+
 CABINETS = (
-    Cabinet(id="cabinet-a", surface="cabinet-a/shelf", slots=tuple((0.35 + 0.26 * i, 4.68) for i in range(5))),
-    Cabinet(id="cabinet-b", surface="cabinet-b/shelf", slots=tuple((4.62 + 0.26 * i, 4.68) for i in range(5))),
-    Cabinet(id="cabinet-c", surface="cabinet-c/shelf", slots=tuple((5.7, 0.35 + 0.26 * i) for i in range(5))),
+    _cabinet("A", (0.15, 4.45), 0.0),
+    _cabinet("B", (4.4, 4.45), 0.0),
+    _cabinet("C", (5.92, 0.14), math.pi / 2),
 )
+#: Zone of the reader in the robot's hand: whatever it reads is somewhere in the room.
+HAND_ZONE = "hand"
 
 #: Places to stand, and the straight ways between them that touch no furniture.
 SPOTS: Mapping[str, Xy] = {
@@ -78,7 +94,7 @@ def route(start: str, *stops: str) -> list[Xy]:
 
 
 def new_world() -> World:
-    """The room as the experiment finds it: the person on the bed, all ten things in the cabinets."""
+    """The room before the experiment: the person on the bed, the cabinets empty, all ten things still outside."""
     return World(
         (item.thing() for item in ITEMS),
         CABINETS,
@@ -86,47 +102,40 @@ def new_world() -> World:
             Mover(id=PERSON, kind="person", xy=SPOTS["bed"]),
             Mover(id=ROBOT, kind="robot", xy=SPOTS["dock"], theta=1.57, speed=0.7),
         ),
-        {
-            ITEMS[number].tag: InCabinet(cabinet, slot)
-            for cabinet, numbers in START.items()
-            for slot, number in enumerate(numbers)
-        },
+        {item.tag: Outside() for item in ITEMS},
     )
 
 
 def description(params: Mapping[str, Any] | None = None, seed: int = 0) -> RoomIn:
     """The room as the server is told of it."""
+    outline = _box(0.0, 0.0, 6.0, 5.0)
     return RoomIn(
         name="Care room (simulated)",
         frame="origin at the south-west corner, x to the east, y to the north",
-        outline=_box(0.0, 0.0, 6.0, 5.0),
+        outline=outline,
         furniture=[
             *(
                 Furniture(
-                    id=cabinet,
-                    name=name,
-                    polygon=_box(*box),
-                    surfaces=[Surface(id="shelf", polygon=_box(*box), z=0.9)],
-                    agent=cabinet,
+                    id=one.id,
+                    name=one.name,
+                    polygon=one.outline,
+                    surfaces=[Surface(id="shelf", polygon=one.outline, z=one.z)],
+                    agent=one.id,
                 )
-                for cabinet, name, box in (
-                    ("cabinet-a", "Cabinet A", (0.15, 4.45, 1.6, 4.92)),
-                    ("cabinet-b", "Cabinet B", (4.4, 4.45, 5.85, 4.92)),
-                    ("cabinet-c", "Cabinet C", (5.46, 0.12, 5.92, 1.6)),
-                )
+                for one in CABINETS
             ),
             Furniture(id="bed", name="Bed", polygon=_box(0.15, 0.25, 1.15, 2.3)),
             Furniture(
                 id="table",
                 name="Table",
                 polygon=_box(3.3, 2.3, 4.6, 3.1),
-                surfaces=[Surface(id="top", polygon=_box(3.3, 2.3, 4.6, 3.1), z=0.7)],
+                surfaces=[Surface(id="top", polygon=_box(3.3, 2.3, 4.6, 3.1), z=TABLE_Z)],
             ),
         ],
         sensors=[
-            *(Sensor(agent=cabinet.id, kind="cabinet") for cabinet in CABINETS),
+            *(Sensor(agent=one.id, kind="cabinet", zones=[Zone(id=one.id, polygon=one.outline)]) for one in CABINETS),
             Sensor(agent=FLOOR_AGENT, kind="floor", pose=(3.0, 0.05, 1.57)),
-            Sensor(agent=ROBOT_AGENT, kind="robot"),
+            Sensor(agent=ROBOT_AGENT, kind="robot", zones=[Zone(id=HAND_ZONE, polygon=outline)]),
         ],
         params=dict(params or {}),
         seed=seed,

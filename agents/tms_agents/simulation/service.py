@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import httpx
 
@@ -54,7 +54,7 @@ def server(data_dir: Path, port: int | None, say: Callable[[str], None]) -> Iter
         assert process.stderr is not None
         yield _ready(process, _follow(process.stderr))
     finally:
-        _stop(process)
+        stop(process)
 
 
 def _ready(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> str:
@@ -105,7 +105,8 @@ def _follow(stream: IO[str]) -> queue.Queue[str | None]:
     return lines
 
 
-def _stop(process: subprocess.Popen[str]) -> None:
+def stop(process: subprocess.Popen[Any]) -> None:
+    """End a process in order, by force where it does not listen."""
     if process.poll() is None:
         process.terminate()
         try:

@@ -1,15 +1,13 @@
-"""The experiment of the paper's section 4, step by step, and the pies it shows.
-
-A script is a generator: it acts on the world and yields whenever time has to pass.
-"""
+"""The experiment of the paper's section 4, step by step, and the pies it shows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from tms_agents.simulation.room import PERSON, ROBOT, SPOTS, TABLE_SURFACE, route
-from tms_agents.simulation.sensors import READ_S
+from tms_agents.simulation.room import PERSON, ROBOT, SPOTS, START, TABLE_SURFACE, TABLE_Z, route
+from tms_agents.simulation.script import Firm, Script, Told, reach, walk
 from tms_agents.simulation.world import World
 
 #: Numbers of the objects that are moved, as in the paper.
@@ -17,7 +15,8 @@ MOVED = (2, 3, 4)
 TOLERANCE = 0.02
 #: Object number -> place in words (see ``pies.place_of``) -> probability.
 Pies = Mapping[int, Mapping[str, float]]
-Script = Iterator[None]
+#: The robot's gripper, metres ahead and above the floor.
+TO_A_PERSON, CARRYING = (0.4, 0.8), (0.4, 1.1)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -33,51 +32,67 @@ class Step:
         return self.pies_weighed if weighed and self.pies_weighed else self.pies
 
 
+def furnish(world: World) -> Script:
+    """Before the story: the room is empty, and its things come one by one, as at an installation."""
+    yield Told(connected=True)
+    for slot in range(max(map(len, START.values()))):
+        for cabinet, numbers in START.items():
+            if slot < len(numbers):
+                world.bring(world.tag_of(numbers[slot]), cabinet, slot)
+        yield Told()
+
+
 def start(world: World) -> Script:
-    yield from wait(world, 0.5)
+    yield Told()
 
 
 def take_three(world: World) -> Script:
     yield from walk(world, PERSON, "bed", "front of A")
     for number in (2, 3):
         world.take(PERSON, world.tag_of(number))
-        yield from wait(world, 0.8)
+        yield Told()
     yield from walk(world, PERSON, "front of A", "front of B")
     world.take(PERSON, world.tag_of(4))
-    yield from wait(world, 0.8)
+    yield Told()
 
 
 def drop_one(world: World) -> Script:
     world.movers[ROBOT].walk(route("dock", "meeting"))
     yield from walk(world, PERSON, "front of B", "north", "bedside")
     world.drop(PERSON, world.tag_of(3), (1.42, 0.62))
-    yield from wait(world, 0.8)
+    yield Told()
 
 
 def hand_over(world: World) -> Script:
     yield from walk(world, PERSON, "bedside", "middle")
     world.movers[ROBOT].face(SPOTS["middle"])
-    yield from wait(world, 0.5)
+    yield from reach(world, ROBOT, TO_A_PERSON)
     world.give(PERSON, world.tag_of(2), ROBOT)
-    yield from wait(world, 0.8)
+    yield Firm()
+    yield from reach(world, ROBOT, CARRYING)
+    yield Told()
 
 
 def carry_to_table(world: World) -> Script:
     yield from walk(world, ROBOT, "meeting", "table side")
-    world.movers[ROBOT].face((4.3, 2.5))
-    yield from wait(world, 0.5)
-    world.set_down(ROBOT, TABLE_SURFACE, (4.3, 2.5))
-    yield from wait(world, 0.8)
+    spot = (4.3, 2.5)
+    world.movers[ROBOT].face(spot)
+    yield from reach(world, ROBOT, (math.dist(SPOTS["table side"], spot), TABLE_Z + 0.1))
+    world.set_down(ROBOT, TABLE_SURFACE, spot)
+    yield Told()
+    yield from reach(world, ROBOT, CARRYING)
 
 
 def put_last(world: World) -> Script:
     yield from walk(world, PERSON, "middle", "north", "front of B")
-    world.put(PERSON, world.tag_of(4), "cabinet-b", 3)
-    yield from wait(world, 0.5 * READ_S)
+    tag = world.tag_of(4)
+    world.put(PERSON, tag, "cabinet-b", 3, cover=True)
+    yield Told(unread=frozenset({tag}))
 
 
 def read_last(world: World) -> Script:
-    yield from wait(world, READ_S)
+    world.uncover(world.tag_of(4))
+    yield Told()
 
 
 def _all_at(number_2: str, number_3: str, number_4: str) -> Pies:
@@ -119,7 +134,7 @@ STEPS = (
         },
     ),
     Step(
-        title="object 4 goes into cabinet B: the load cells feel it at once, the tag reader is still on its round",
+        title="object 4 goes into cabinet B: the load cells feel it at once, the hand still covers its tag",
         act=put_last,
         pies={
             2: {"table": 1.0},
@@ -129,22 +144,8 @@ STEPS = (
         pies_weighed=_all_at("table", "floor", "cabinet B"),
     ),
     Step(
-        title="its tag is read: everything is certain, object 3 by elimination",
+        title="the hand is gone and the tag is read: everything is certain, object 3 by elimination",
         act=read_last,
         pies=_all_at("table", "floor", "cabinet B"),
     ),
 )
-
-
-def walk(world: World, mover: str, start: str, *stops: str) -> Script:
-    """Walk from one spot of the room to others; ends when the mover stands."""
-    world.movers[mover].walk(route(start, *stops))
-    while world.movers[mover].path:
-        yield
-    yield from wait(world, 0.3)
-
-
-def wait(world: World, seconds: float) -> Script:
-    until = world.time_s + seconds
-    while world.time_s < until - 1e-9:
-        yield

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TextIO
 
 from tms_agents.simulation import pies
+from tms_agents.simulation.hardware import Plugs
 
 
 class Terminal:
@@ -20,6 +22,16 @@ class Terminal:
 
     def headline(self, url: str, room: str) -> None:
         self.say(f"The page: {self._bold(f'{url}/')}\nTen objects in room {room!r}; the experiment begins.")
+
+    def devices(self, plugs: Mapping[str, Plugs], configs: Mapping[str, Path]) -> None:
+        """One line per agent: its emulated devices, where they are plugged in, and how it was started."""
+        self.say("\nThe agents read emulated devices; name your own in such a file to use them instead:")
+        for agent, plug in plugs.items():
+            kind = "hand" if plug.states else "cabinet"
+            board = f"load cells {plug.loads}, " if plug.loads else ""
+            states = f", joints and fingers tcp {plug.states[0]}:{plug.states[1]}" if plug.states else ""
+            self.say(f"  {agent}: {board}TR3 {plug.reader}{states}; tms agent {kind} --config {configs[agent]}")
+        self.say("Things are put into the cabinets, one by one; boards and readers take their time ...")
 
     def step(self, number: int, title: str) -> None:
         self.say(f"\n{self._bold(f'({number})')} {title}")

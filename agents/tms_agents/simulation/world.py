@@ -14,6 +14,8 @@ from typing import Literal
 
 Xy = tuple[float, float]
 REACH_M = 1.0
+#: Of a robot's gripper, m/s.
+HAND_SPEED = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -58,22 +60,57 @@ class OnTable:
     xy: Xy
 
 
-Place = InCabinet | Held | Gripped | OnFloor | OnTable
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """Not in the room yet: any number of things."""
+
+
+Place = InCabinet | Held | Gripped | OnFloor | OnTable | Outside
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Cabinet:
-    """A cabinet with places to put one thing each, at ``slots``."""
+    """A cabinet with one shelf board, on which things stand at ``spots`` (board frame: metres from its corner).
+
+    ``corner`` and ``theta`` are the board's pose in the room; it is ``width`` along its x axis and ``depth`` along y.
+    """
 
     id: str
-    surface: str
-    slots: tuple[Xy, ...]
+    name: str
+    corner: Xy
+    theta: float
+    width: float
+    depth: float
+    spots: tuple[Xy, ...]
     z: float = 0.9
+
+    @property
+    def surface(self) -> str:
+        return f"{self.id}/shelf"
+
+    @property
+    def slots(self) -> tuple[Xy, ...]:
+        """The spots in the room."""
+        return tuple(self.in_room(spot) for spot in self.spots)
+
+    @property
+    def outline(self) -> list[Xy]:
+        """Of the board in the room."""
+        w, d = self.width, self.depth
+        return [self.in_room(corner) for corner in ((0.0, 0.0), (w, 0.0), (w, d), (0.0, d))]
+
+    def in_room(self, xy: Xy) -> Xy:
+        cos, sin = math.cos(self.theta), math.sin(self.theta)
+        (x, y), (left, low) = xy, self.corner
+        return (round(left + cos * x - sin * y, 6), round(low + sin * x + cos * y, 6))
 
 
 @dataclass(kw_only=True, slots=True)
 class Mover:
-    """A person or a robot, walking along ``path``."""
+    """A person or a robot, walking along ``path``; a robot also moves its arm towards ``hand_goal``.
+
+    ``hand``: how far ahead of the robot's middle its gripper is, and how high above the floor.
+    """
 
     id: str
     kind: Literal["person", "robot"]
@@ -81,16 +118,20 @@ class Mover:
     theta: float = 0.0
     speed: float = 1.0
     path: deque[Xy] = field(default_factory=deque)
+    hand: Xy = (0.4, 1.1)
+    hand_goal: Xy = (0.4, 1.1)
 
     @property
     def gripper(self) -> Xy:
-        """Where a robot's closed hand is: an arm's length ahead."""
-        return (self.xy[0] + 0.4 * math.cos(self.theta), self.xy[1] + 0.4 * math.sin(self.theta))
+        """Where a robot's hand is, seen from above."""
+        ahead = self.hand[0]
+        return (self.xy[0] + ahead * math.cos(self.theta), self.xy[1] + ahead * math.sin(self.theta))
 
     def walk(self, waypoints: Iterable[Xy]) -> None:
         self.path = deque(waypoints)
 
     def step(self, seconds: float) -> None:
+        self._step_hand(HAND_SPEED * seconds)
         left = self.speed * seconds
         while self.path and left > 0:
             target = self.path[0]
@@ -107,6 +148,15 @@ class Mover:
                     self.xy[1] + share * (target[1] - self.xy[1]),
                 )
                 left = 0.0
+
+    def _step_hand(self, left: float) -> None:
+        gap = math.dist(self.hand, self.hand_goal)
+        if gap <= left:
+            self.hand = self.hand_goal
+            return
+        share = left / gap
+        (ahead, up), (ahead_goal, up_goal) = self.hand, self.hand_goal
+        self.hand = (ahead + share * (ahead_goal - ahead), up + share * (up_goal - up))
 
     def face(self, target: Xy) -> None:
         self.theta = math.atan2(target[1] - self.xy[1], target[0] - self.xy[0])
@@ -132,6 +182,8 @@ class World:
         self.cabinets = {cabinet.id: cabinet for cabinet in cabinets}
         self.movers = {mover.id: mover for mover in movers}
         self.places: dict[str, Place] = {}
+        #: Tags in cabinets that somebody's hand still covers: no reader reads them.
+        self.covered: set[str] = set()
         if places.keys() != self.things.keys():
             raise Impossible("every thing must be in exactly one place")
         for tag, place in places.items():
@@ -159,6 +211,8 @@ class World:
                 return self.movers[by].gripper
             case OnFloor(xy) | OnTable(_, xy):
                 return xy
+            case Outside():
+                raise Impossible(f"{tag} is not in the room")
 
     def held_by(self, mover: str) -> list[str]:
         return [tag for tag, place in self.places.items() if place == Held(mover)]
@@ -167,12 +221,24 @@ class World:
         return next((tag for tag, place in self.places.items() if place == Gripped(robot)), None)
 
     def free_slots(self, cabinet: str) -> list[int]:
-        taken = {
-            place.slot for place in self.places.values() if isinstance(place, InCabinet) and place.cabinet == cabinet
-        }
+        taken = set(self.inside(cabinet).values())
         return [slot for slot in range(len(self.cabinets[cabinet].slots)) if slot not in taken]
 
+    def inside(self, cabinet: str) -> dict[str, int]:
+        """Slots of the things in a cabinet, by tag."""
+        return {
+            tag: place.slot
+            for tag, place in self.places.items()
+            if isinstance(place, InCabinet) and place.cabinet == cabinet
+        }
+
     # what people and robots do
+
+    def bring(self, tag: str, cabinet: str, slot: int) -> None:
+        """Somebody who furnishes the room puts a new thing into a cabinet."""
+        if not isinstance(self.places[tag], Outside):
+            raise Impossible(f"{tag} is in the room already")
+        self._move(tag, InCabinet(cabinet, slot))
 
     def take(self, person: str, tag: str) -> None:
         """A person takes a thing from wherever it lies."""
@@ -181,11 +247,16 @@ class World:
         self._require_reach(person, self.position(tag))
         self._move(tag, Held(person))
 
-    def put(self, person: str, tag: str, cabinet: str, slot: int) -> None:
-        """A person puts a thing into a cabinet."""
+    def put(self, person: str, tag: str, cabinet: str, slot: int, *, cover: bool = False) -> None:
+        """A person puts a thing into a cabinet; with ``cover`` the hand stays over its tag until ``uncover``."""
         self._require_held(person, tag)
         self._require_reach(person, self.cabinets[cabinet].slots[slot])
         self._move(tag, InCabinet(cabinet, slot))
+        if cover:
+            self.covered.add(tag)
+
+    def uncover(self, tag: str) -> None:
+        self.covered.discard(tag)
 
     def drop(self, person: str, tag: str, xy: Xy) -> None:
         """A person lets a thing fall to the floor."""
@@ -210,9 +281,10 @@ class World:
     def _move(self, tag: str, place: Place) -> None:
         self._require_free(place)
         self.places[tag] = place
+        self.covered.discard(tag)
 
     def _require_free(self, place: Place) -> None:
-        if not isinstance(place, Held) and place in self.places.values():
+        if not isinstance(place, Held | Outside) and place in self.places.values():
             raise Impossible(f"{place} is taken")
 
     def _require_held(self, person: str, tag: str) -> None:

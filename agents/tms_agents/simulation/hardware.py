@@ -1,0 +1,100 @@
+"""Where the emulated devices are plugged in: pseudo terminals and a TCP port, served by a thread of their own."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AsyncExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from tms_agents.devices.emulation import PtyLine, TcpLine
+from tms_agents.simulation.cabinet_bench import CabinetBench
+from tms_agents.simulation.robot_bench import STATE_S, RobotBench
+from tms_agents.simulation.room import CABINETS, ROBOT, ROBOT_AGENT
+from tms_agents.simulation.world import World
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Plugs:
+    """Where the devices of one agent are plugged in: ``loads`` a load-cell board, ``states`` the robot's controller."""
+
+    reader: str
+    loads: str | None = None
+    states: tuple[str, int] | None = None
+
+
+class Hardware:
+    """All devices of the room; made by ``plugged_in``."""
+
+    def __init__(self, seed: int) -> None:
+        names = [*(one.id for one in CABINETS), ROBOT_AGENT]
+        streams = dict(zip(names, np.random.default_rng(seed).spawn(len(names)), strict=True))
+        self.cabinets: Mapping[str, CabinetBench] = {one.id: CabinetBench(one, streams[one.id]) for one in CABINETS}
+        self.robot = RobotBench(ROBOT, streams[ROBOT_AGENT])
+        self.plugs: dict[str, Plugs] = {}
+        self._loop = asyncio.new_event_loop()
+        self._unplug = asyncio.Event()
+
+    def follow(self, world: World) -> None:
+        """What people and robots just did in the room happens at the devices."""
+        self._call(lambda: self._follow(world))
+
+    def _follow(self, world: World) -> None:
+        for bench in self.cabinets.values():
+            bench.follow(world)
+        self.robot.follow(world)
+
+    def _call(self, work: Callable[[], T]) -> T:
+        """Run in the devices' thread."""
+
+        async def run() -> T:
+            return work()
+
+        return asyncio.run_coroutine_threadsafe(run(), self._loop).result()
+
+    async def serve(self, ready: Callable[[], object]) -> None:
+        async with AsyncExitStack() as stack:
+            for name, bench in self.cabinets.items():
+                board, reader = PtyLine(bench.board), PtyLine(bench.reader)
+                for line in (board, reader):
+                    await stack.enter_async_context(line)
+                self.plugs[name] = Plugs(reader=reader.path, loads=board.path)
+            hand, states = PtyLine(self.robot.reader), TcpLine(self.robot, tick_s=STATE_S)
+            await stack.enter_async_context(hand)
+            await stack.enter_async_context(states)
+            self.plugs[ROBOT_AGENT] = Plugs(reader=hand.path, states=(states.host, states.port))
+            ready()
+            await self._unplug.wait()
+
+    def start(self) -> Callable[[], None]:
+        """Plug in; the answer pulls all plugs."""
+        ready = threading.Event()
+        thread = threading.Thread(
+            target=lambda: self._loop.run_until_complete(self.serve(ready.set)), name="devices", daemon=True
+        )
+        thread.start()
+        if not ready.wait(30.0):
+            raise OSError("the emulated devices cannot be plugged in")
+
+        def stop() -> None:
+            self._loop.call_soon_threadsafe(self._unplug.set)
+            thread.join(10.0)
+            self._loop.close()
+
+        return stop
+
+
+@contextmanager
+def plugged_in(seed: int) -> Iterator[Hardware]:
+    hardware = Hardware(seed)
+    stop = hardware.start()
+    try:
+        yield hardware
+    finally:
+        stop()
