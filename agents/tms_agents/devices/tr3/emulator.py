@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable, Iterable
 
 from tms_agents.devices.tr3.codec import (
     ACK,
@@ -33,6 +34,8 @@ class Tr3Device:
 
     def __init__(self, antennas: int = 2) -> None:
         self.tags: dict[int, list[str]] = {antenna: [] for antenna in range(antennas)}
+        #: For a simulation: asked at every round what stands before the antenna, instead of ``tags``.
+        self.look: Callable[[int], Iterable[str]] | None = None
         self.inventory_options: tuple[int, ...] = INVENTORY_OPTIONS
         self.switches_antennas = True
         #: Whether switching the field off makes tags answer again.
@@ -78,7 +81,7 @@ class Tr3Device:
     def tick(self) -> bytes:
         if not self._rdloop or not self.rf_on:
             return b""
-        frames = (Frame(RDLOOP, bytes.fromhex(uid)[::-1] + bytes(16)) for uid in self.tags[self.antenna])
+        frames = (Frame(RDLOOP, bytes.fromhex(uid)[::-1] + bytes(16)) for uid in self._in_view())
         return self._out(b"".join(frame.encode() for frame in frames))
 
     def _restart(self) -> None:
@@ -131,7 +134,10 @@ class Tr3Device:
         return [Frame(NACK, bytes([FORMAT_ERROR]))]
 
     def _inventory(self) -> list[Frame]:
-        new = [uid for uid in self.tags[self.antenna] if uid not in self._reported and self.rf_on]
+        new = [uid for uid in self._in_view() if uid not in self._reported and self.rf_on]
         self._reported.update(new)
         uids = [Frame(UID, b"\x00" + bytes.fromhex(uid)[::-1]) for uid in new]
         return [Frame(ACK, bytes([0xF0, len(new)])), *uids]
+
+    def _in_view(self) -> list[str]:
+        return self.tags[self.antenna] if self.look is None else [uid.upper() for uid in self.look(self.antenna)]
