@@ -13,7 +13,7 @@ import pty
 import tempfile
 import tty
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 class EmulatedDevice(Protocol):
@@ -21,6 +21,7 @@ class EmulatedDevice(Protocol):
         """The answer to what the host sent, in pieces of any size."""
 
 
+@runtime_checkable
 class StreamingDevice(EmulatedDevice, Protocol):
     """A device that also speaks by itself, if the line has a ``tick_s``."""
 
@@ -44,10 +45,11 @@ class _Line:
         await asyncio.gather(self._ticking, return_exceptions=True)
 
     async def _tick(self) -> None:
-        tick = getattr(self.device, "tick", None)
-        while tick is not None and self._tick_s is not None:
+        if self._tick_s is None or not isinstance(self.device, StreamingDevice):
+            return
+        while True:
             await asyncio.sleep(self._tick_s)
-            if data := tick():
+            if data := self.device.tick():
                 self.inject(data)
 
 

@@ -23,7 +23,3 @@ class ScannerDevice:
         if self.aim and len(digits) == 12:
             digits = f"0{digits}"
         return f"{_AIM.get(len(digits), '') if self.aim else ''}{digits}{self.ending}".encode("ascii")
-
-    def scan_elements(self, elements: str, symbology: str = "]C1") -> bytes:
-        """A GS1 symbol; separators are the character 1D."""
-        return f"{symbology if self.aim else ''}{elements}{self.ending}".encode("ascii")

@@ -197,8 +197,8 @@ class Link(DeviceLink[T]):
         self._open, self._session, self._tick_s = opener, session, tick_s
 
     async def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
+        session = self._session()  # before the stream: settings that cannot be leave nothing open
         stream = await self._open()
-        session = self._session()
         tick_s = self._tick_s
         if isinstance(session, Paced):
             tick_s = min(tick_s, max(session.tick_s, _SHORTEST_TICK_S))

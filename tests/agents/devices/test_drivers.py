@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 import time
 
 import pytest
 from link_listening import QUICK, on_a_line, states, until
+from sllurp_client import sllurp_reads
 
 from tms_agents.devices.emulation import PtyLine
 from tms_agents.devices.llrp.emulator import LlrpEmulator
 from tms_agents.devices.llrp.session import LlrpSession
+from tms_agents.devices.scales import ScaleLineSession
 from tms_agents.devices.tags import RoundEnd, TagItem, TagRead
 from tms_agents.devices.tr3.codec import Frame
 from tms_agents.devices.tr3.emulator import Tr3Device
@@ -94,28 +95,9 @@ async def test_nobody_listens():
 
 
 async def test_sllurp_accepts_the_emulator():
-    """An independent client (of another project) sets the emulated reader up and gets its reports."""
-    import sllurp.llrp as sllurp
-
-    got: list[str] = []
-    enough = threading.Event()
-
-    def report(client, tags):
-        got.extend(tag["EPC-96"].decode() for tag in tags)
-        enough.set()
-
     async with LlrpEmulator(period_s=0.05) as reader:
         reader.see(EPC)
-        config = sllurp.LLRPReaderConfig({"antennas": [1], "keepalive_interval": 200})
-        client = sllurp.LLRPReaderClient("127.0.0.1", reader.port, config)
-        client.add_tag_report_callback(report)
-        try:
-            await asyncio.to_thread(client.connect)
-            assert await asyncio.to_thread(enough.wait, 10)
-        finally:
-            await asyncio.to_thread(client.disconnect)
-            await asyncio.to_thread(client.join, 5)
-    assert set(got) == {EPC.lower()}
+        assert await sllurp_reads(reader.port, antennas=[1]) == {(EPC, 1)}
     assert "GET_READER_CAPABILITIES" in reader.heard
 
 
@@ -189,3 +171,15 @@ async def test_tr3_rdloop_is_listened_to():
 async def test_no_such_serial_port(tmp_path):
     (state,) = await until(tr3(serial(str(tmp_path / "tty"), 38400)), lambda seen: True)
     assert state.state == "faulty" and "No such file" in state.why
+
+
+async def test_settings_that_cannot_be_are_said_before_anything_is_opened():
+    opened = []
+
+    async def opener():
+        opened.append(True)
+        raise OSError("opened")
+
+    link = Link(opener, lambda: ScaleLineSession("openscale", zero_first=True), name="scale", retry=QUICK)
+    (state,) = await until(link, lambda seen: True)
+    assert state == DeviceState("faulty", "scale: this scale has no zero command") and not opened

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import threading
 
 import pytest
 from device_conversation import rounds
 from link_listening import QUICK, states
+from sllurp_client import sllurp_reads
 
 from tms_agents.devices.llrp import messages
 from tms_agents.devices.llrp.codec import FrameParser, Message, Parameter, encode
@@ -166,27 +166,8 @@ def test_what_the_rounds_are_made_of():
 
 
 async def test_sllurp_reads_several_antennas_of_the_emulator():
-    """An independent client (of another project), told to use two of the antennas."""
-    import sllurp.llrp as sllurp
-
-    got: set[tuple[str, int]] = set()
-    enough = threading.Event()
-
-    def report(client, tags):
-        got.update((tag["EPC-96"].decode().upper(), tag["AntennaID"]) for tag in tags)
-        if len(got) >= 2:
-            enough.set()
-
     async with LlrpEmulator(period_s=0.02) as reader:
         for antenna, epc in enumerate(EPCS, 1):
             reader.see(epc, antenna=antenna)
-        config = sllurp.LLRPReaderConfig({"antennas": [1, 3], "keepalive_interval": 200, "report_every_n_tags": 1})
-        client = sllurp.LLRPReaderClient("127.0.0.1", reader.port, config)
-        client.add_tag_report_callback(report)
-        try:
-            await asyncio.to_thread(client.connect)
-            assert await asyncio.to_thread(enough.wait, 10)
-        finally:
-            await asyncio.to_thread(client.disconnect)
-            await asyncio.to_thread(client.join, 5)
+        got = await sllurp_reads(reader.port, 2, antennas=[1, 3], report_every_n_tags=1)
     assert got == {(EPCS[0], 1), (EPCS[2], 3)}

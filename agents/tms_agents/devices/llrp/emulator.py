@@ -37,7 +37,7 @@ class LlrpEmulator:
         self.fail: set[str] = set()
         self.silent = False
         self.tags: dict[str, TagRead] = {}
-        #: Names of the messages received, for tests.
+        #: Names of the messages received, for tests; the last thousand.
         self.heard: list[str] = []
         self.acknowledged = 0
         #: A reader that announces the end of an AISpec before it reports its tags.
@@ -136,6 +136,7 @@ class LlrpEmulator:
 
     def _answer(self, message: Message, writer: asyncio.StreamWriter) -> None:
         self.heard.append(message.name)
+        del self.heard[:-1000]
         if self.silent:
             return
         if message.name == "KEEPALIVE_ACK":

@@ -29,6 +29,7 @@ class ThingMagicDevice:
         #: it hears nothing.
         self.power_cycle_after: int | None = None
         self.power_cycles = 0
+        #: Commands received; the last thousand.
         self.heard: list[Command] = []
         #: Boot loaders of later modules start the firmware by themselves.
         self.boots_itself = False
@@ -67,6 +68,7 @@ class ThingMagicDevice:
 
     def _answer(self, command: Command) -> Reply:
         self.heard.append(command)
+        del self.heard[:-1000]
         if status := self.fail.get(command.code):
             return Reply(command.code, b"", status)
         if command.code == m.VERSION:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from tms_agents.devices.tags import TagRead
 from tms_agents.devices.thingmagic.codec import Command, Reply
 
-VERSION, BOOT, CURRENT_PROGRAM = 0x03, 0x04, 0x0C
+VERSION, BOOT = 0x03, 0x04
 READ_SINGLE, READ_MULTIPLE, GET_BUFFER, CLEAR_BUFFER = 0x21, 0x22, 0x29, 0x2A
 SET_ANTENNA, SET_READ_POWER, SET_PROTOCOL, SET_REGION = 0x91, 0x92, 0x93, 0x97
 GET_ANTENNA, GET_READ_POWER, GET_PROTOCOL, GET_REGION = 0x61, 0x62, 0x63, 0x67

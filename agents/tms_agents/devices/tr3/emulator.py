@@ -47,6 +47,7 @@ class Tr3Device:
         #: it hears nothing.
         self.power_cycle_after: int | None = None
         self.power_cycles = 0
+        #: Commands received, for tests; the last thousand.
         self.heard: list[Frame] = []
         self.antenna, self.rf_on = 0, True
         self._starting, self._rdloop = False, False
@@ -101,6 +102,7 @@ class Tr3Device:
 
     def _answer(self, frame: Frame) -> list[Frame]:
         self.heard.append(frame)
+        del self.heard[:-1000]
         if self.nack_next:
             self.nack_next -= 1
             return [Frame(NACK, bytes([self.nack_code]))]

@@ -30,6 +30,8 @@ from tms_agents.devices.transport import DeviceFault
 Mode = Literal["inventory", "rdloop"]
 #: How often a command that arrived damaged is sent again.
 _REPEATS = 2
+#: Tags of one round: more than a reader can read in it.
+_MOST_REMEMBERED = 1000
 
 
 class _Command(NamedTuple):
@@ -101,7 +103,8 @@ class Tr3Session(PollingReader[_Command, Frame]):
         # ISO 15693-3: the first byte of every UID is E0. A UID after anything but an inventory is a late one.
         if current.antenna is None or not uid.startswith("E0"):
             return []
-        self._forgetful.saw(uid)
+        if not self._switches:
+            self._forgetful.saw(uid)
         if self._tags_to_come is not None:
             self._tags_to_come -= 1
         return [TagRead(tag=uid, antenna=current.antenna), *self._round_end(current.antenna)]
@@ -210,7 +213,8 @@ class _Forgetful:
         self._proved = False
 
     def saw(self, uid: str) -> None:
-        self._now.add(uid)
+        if len(self._now) < _MOST_REMEMBERED:
+            self._now.add(uid)
 
     def next_round(self) -> bool:
         self._proved = self._proved or bool(self._now & self._before)
