@@ -18,10 +18,11 @@ import pytest
 from server_process import ServerProcess
 
 from tms_agents.simulation.catalogue import ITEMS
-from tms_agents.simulation.demo import Plan, run
+from tms_agents.simulation.demo import Plan, register, run
 from tms_agents.simulation.room import START, new_world
 from tms_agents.simulation.terminal import Terminal
 from tms_client import Town
+from tms_schemas.belief import OUTSIDE
 
 HALF = {"floor": 0.5, "person": 0.5}
 #: Figure 8 of the paper, by hand: object -> place -> probability, after each step.
@@ -60,6 +61,9 @@ def test_the_pies_are_those_of_the_paper(tmp_path: Path) -> None:
             assert not list(town.unknown_tags("demo"))
             assert town.anomalies("demo").anomalies == []
             assert_measured(town)
+            register(town, Plan())  # as the next demo does in the same room
+            places = town.where(ITEMS[2].tag).places
+            assert [(one.label, one.p) for one in places] == [(OUTSIDE, pytest.approx(1.0))]
     for step, (found, wanted) in enumerate(zip(terminal.found, FIGURE_8, strict=True)):
         for number, pie in wanted.items():
             for place, p in pie.items():

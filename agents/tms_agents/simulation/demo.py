@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -20,7 +21,7 @@ from tms_agents.simulation.service import server
 from tms_agents.simulation.stage import UTC_NOW, staged
 from tms_agents.simulation.story import MOVED, STEPS, furnish
 from tms_agents.simulation.terminal import Terminal
-from tms_client import Retry, Town, TownError
+from tms_client import NotFound, Retry, Town, TownError
 from tms_client.cli import CommandError
 from tms_schemas.objects import ObjectFields, ProductIn
 
@@ -68,11 +69,16 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
 
 
 def register(town: Town, plan: Plan) -> None:
-    """The room, the products and the ten objects, with weights only where the plan says so."""
+    """The room, the products and the ten objects, with weights only where the plan says so.
+
+    Objects that a former demo left are registered anew: they are outside until they come into the room again.
+    """
     town.rooms.put(plan.room, description(seed=plan.seed))
     for item in ITEMS:
         weights = {"weight_g": item.weight_g, "weight_sd_g": 1.0} if plan.weights else {}
         town.products.put(item.jan, ProductIn(name=item.name, category=item.category, **weights))
+        with contextlib.suppress(NotFound):
+            town.objects.delete(item.tag)
         town.objects.put(
             item.tag,
             ObjectFields(name=item.name, synonyms=list(item.synonyms), jan=item.jan, room=plan.room),
