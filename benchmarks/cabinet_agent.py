@@ -1,6 +1,6 @@
 """The cabinet agent on this computer: how late its events are on the server, and what it costs.
 
-    python benchmarks/cabinet_agent.py [--seconds 60] [--things 20]
+    python benchmarks/cabinet_agent.py [--seconds 60] [--things 20] [--ask all]
 
 A board of four cells at 50 Hz and a TR3 behind pseudo terminals (a process of their own), a real server, ``tms agent
 cabinet`` as a process. Latency: from the moment the load has its final value to the first moment the server answers
@@ -36,7 +36,7 @@ server = {{ url = "{url}", linger_s = {linger} }}
 spool = {{ path = "cabinet.spool" }}
 [[boards]]
 name = "shelf"
-load = {{ kind = "ros-tms", device = "{board}" }}
+load = {{ kind = "ros-tms", device = "{board}", ask = "{ask}" }}
 width = 0.465
 depth = 0.317
 cells = {cells}
@@ -83,7 +83,7 @@ def process(*command: str, **options: int) -> Iterator[subprocess.Popen[str]]:
         running.wait(20)
 
 
-def measure(seconds: float, things: int) -> None:
+def measure(seconds: float, things: int, ask: str) -> None:
     folder = Path(tempfile.mkdtemp(prefix="tms-bench-"))
     serve = ("-m", "tms_client", "serve", "--data-dir", str(folder / "data"), "--port", "0")
     with (
@@ -94,7 +94,9 @@ def measure(seconds: float, things: int) -> None:
         url = next(line.split()[1].rstrip("/") for line in server.stderr if line.startswith("tms: http"))
         board, reader = devices.stdout.readline().split()
         config = folder / "cabinet.toml"
-        config.write_text(CONFIG.format(url=url, board=board, reader=reader, cells=CELLS.tolist(), linger=0.02))
+        config.write_text(
+            CONFIG.format(url=url, board=board, reader=reader, cells=CELLS.tolist(), linger=0.02, ask=ask)
+        )
         (folder / "cabinet.calibration.toml").write_text("[shelf]\ngain = [1, 1, 1, 1]\noffset = [0, 0, 0, 0]\n")
         with Town(url) as town:
             town.rooms.put("bench", RoomIn.model_validate({"name": "Bench", "outline": [[0, 0], [2, 0], [2, 2]]}))
@@ -103,7 +105,8 @@ def measure(seconds: float, things: int) -> None:
                 while town.agents.get("bench-cabinet").state != "connected":
                     time.sleep(0.05)
                 time.sleep(3)
-                print(f"cost at rest, {seconds:g} s: {100 * cost(agent.pid, seconds):.2f} % of one core (goal 2)")
+                used = 100 * cost(agent.pid, seconds)
+                print(f"cost at rest, cells asked {ask}, {seconds:g} s: {used:.2f} % of one core (goal 2)")
                 for kind in ("tag", "plain"):
                     late = latencies(town, devices, things, kind)
                     for what, values in late.items():
@@ -149,9 +152,10 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--things", type=int, default=20)
+    parser.add_argument("--ask", choices=["one", "all"], default="one", help="cell after cell, or all at once")
     parser.add_argument("--play", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.play:
         asyncio.run(play())
     else:
-        measure(arguments.seconds, arguments.things)
+        measure(arguments.seconds, arguments.things, arguments.ask)

@@ -25,7 +25,7 @@ from tms_agents.devices.lines import LineParser
 from tms_agents.devices.llrp.codec import MAX_MESSAGE
 from tms_agents.devices.llrp.codec import FrameParser as LlrpParser
 from tms_agents.devices.llrp.session import LlrpSession
-from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.modbus import StatusRegister, WeighingMap
 from tms_agents.devices.scales import DialectName, ScaleLineSession
 from tms_agents.devices.scanner import ScannerSession
@@ -194,6 +194,7 @@ TARGETS: list[tuple[str, Callable[[], Target]]] = [
     ("text reader", _session(lambda clock: TextReaderSession(clock=clock), _LONGEST_TEXT, _TEXT_READER)),
     ("rdm6300 frames", _parser(Rdm6300Parser, _RDM_FRAME, _RDM6300)),
     ("load-cell board", _session(lambda clock: RosTmsBoardSession(clock=clock), _LONGEST_TEXT, _BOARD)),
+    ("board, all at once", _session(lambda clock: RosTmsBoardBurst(clock=clock), _LONGEST_TEXT, _BOARD)),
     _scale("openscale"),
     _scale("and"),
     _scale("mt-sics"),

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from tms_agents.config import Section
-from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.loads import LoadSample, LoadSource
 from tms_agents.devices.modbus import (
     Kind as RegisterKind,
@@ -64,6 +64,8 @@ class RosTmsBoard(_Line):
     kind: Literal["ros-tms"]
     cells: Annotated[int, Field(ge=1, le=36)] = 4
     period_s: Annotated[float, Field(ge=0.005, le=10)] = 0.02
+    #: ``one`` cell after the other, safe with any firmware; or ``all`` at once, which costs far less processor time.
+    ask: Literal["one", "all"] = "one"
 
     @property
     def cell_count(self) -> int:
@@ -77,10 +79,13 @@ class RosTmsBoard(_Line):
         return _link(
             f"board {self.place}",
             self.opener(115200),
-            lambda: RosTmsBoardSession(cells=self.cells, period_s=self.period_s),
+            lambda: self._session()(cells=self.cells, period_s=self.period_s),
             silent_after_s,
             self.period_s / 4,
         )
+
+    def _session(self) -> type[RosTmsBoardSession] | type[RosTmsBoardBurst]:
+        return RosTmsBoardSession if self.ask == "one" else RosTmsBoardBurst
 
 
 class Scale(_Line):

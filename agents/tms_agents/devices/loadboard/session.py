@@ -26,9 +26,10 @@ from tms_agents.devices.outgoing import Outgoing
 
 #: Sensor index -> the character that asks for it.
 INDEX = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-_NUMBER = re.compile(rb"\s*([+-]?\d{1,10})\s*")
+_NUMBER = re.compile(rb"[+-]?\d{1,10}")
 _OLD_FIRMWARE = re.compile(rb'[OK"]')
-_LONGEST_LINE = 40
+#: Bytes of a line, at most.
+LONGEST_LINE = 40
 #: A cell that missed this many answers in a row is asked less often, so that it does not slow down the others.
 _MISSES = 3
 #: The line counts as quiet only after that many looks at it: this process may itself have slept in between.
@@ -69,7 +70,7 @@ class RosTmsBoardSession(Outgoing):
         self.doubtful_rounds = 0
         self._period_s, self._reply_s, self._late_s, self._retry_s = period_s, reply_s, late_s, retry_s
         self._clock = clock
-        self._lines = LineParser(_LONGEST_LINE)
+        self._lines = LineParser(LONGEST_LINE)
         self._values = [float("nan")] * cells
         self._misses = [0] * cells
         self._ask_again = [0.0] * cells
@@ -88,7 +89,7 @@ class RosTmsBoardSession(Outgoing):
         now = self._heard_at = self._clock()
         self._looks = 0
         for line in self._lines.feed(data):
-            self._line(_OLD_FIRMWARE.sub(b"", line), now)
+            self._line(answer_in(line), now)
         done, self._done = self._done, []
         return done
 
@@ -131,15 +132,14 @@ class RosTmsBoardSession(Outgoing):
             self._output += INDEX[self._asked].encode()
 
     def _line(self, line: bytes, now: float) -> None:
-        number = _NUMBER.fullmatch(line)
-        if not line.strip() or self._draining:
+        if not line or self._draining:
             return
         if self._asked is None:
             self._drop()
-        elif number is None:
+        elif (number := number_in(line)) is None:
             self._miss(now)
         else:
-            self._values[self._asked] = float(number[1])
+            self._values[self._asked] = number
             self._misses[self._asked] = 0
             self._slowest_s = max(self._slowest_s * _FORGET, now - self._asked_at)
             self._asked = None
@@ -170,3 +170,13 @@ class RosTmsBoardSession(Outgoing):
         fault = f"no answer from cell {', '.join(dead)}" if dead else ""
         if not all(map(math.isnan, self._values)):
             self._done.append(LoadSample(values=tuple(self._values), fault=fault))
+
+
+def answer_in(line: bytes) -> bytes:
+    """A line without what older firmware says around its numbers; empty where that is all."""
+    return _OLD_FIRMWARE.sub(b"", line).strip()
+
+
+def number_in(answer: bytes) -> float | None:
+    """The counts; None where the answer is no number."""
+    return float(answer) if _NUMBER.fullmatch(answer) else None

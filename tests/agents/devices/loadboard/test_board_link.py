@@ -9,7 +9,7 @@ import pytest
 from link_listening import QUICK, on_a_line, samples, states, until
 
 from tms_agents.devices.emulation import PtyLine, TcpLine
-from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.transport import DeviceState, Link, serial, tcp
@@ -34,6 +34,16 @@ async def test_the_board_is_asked_at_its_pace_whatever_the_tick_of_the_link():
     async with PtyLine(RosTmsBoardDevice(lambda t: [1, 2, 3, 4])) as line:
         link = board(serial(line.path, 115200), tick_s=1.0)
         assert len(samples(await until(link, lambda seen: len(samples(seen)) == 30))) == 30  # in less than 8 seconds
+
+
+@pytest.mark.parametrize("kind", ["pty", "tcp"])
+async def test_all_cells_asked_at_once_over_a_line(kind):
+    device = RosTmsBoardDevice(lambda t: [10, -20, 30.4, 123456])
+    async with on_a_line(kind, device, 115200) as (_, opener):
+        link = Link(opener, lambda: RosTmsBoardBurst(quiet_s=0.1), name="board", retry=QUICK)
+        seen = await until(link, lambda seen: len(samples(seen)) == 30)
+        assert states(seen) == ["connected"]
+        assert {sample.values for sample in samples(seen)} == {(10.0, -20.0, 30.0, 123456.0)}
 
 
 async def test_a_pulled_cable_is_said_and_recovers_without_restart():

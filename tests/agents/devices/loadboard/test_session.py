@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tms_agents.devices.loadboard import RosTmsBoardSession
+from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
+from tms_agents.devices.transport import DeviceFault
 
 #: Every cell has values that no other cell has, so that a mix-up shows.
 CELLS = (1000, 2000, 3000, 4000)
@@ -19,7 +20,7 @@ CELLS = (1000, 2000, 3000, 4000)
 class Wire:
     """A session and a board on one wire; ``run`` moves time on in steps of a millisecond."""
 
-    def __init__(self, device_options=None, **options) -> None:
+    def __init__(self, device_options=None, kind=RosTmsBoardSession, **options) -> None:
         self.now = 0.0
 
         def clock():
@@ -29,9 +30,9 @@ class Wire:
             return [value + int(t * 50) % 900 for value in CELLS]
 
         self.device = RosTmsBoardDevice(counts, boot_s=0.05, clock=clock, **(device_options or {}))
-        self.session = RosTmsBoardSession(clock=clock, **options)
+        self.session = kind(clock=clock, **options)
         self.session.opened()
-        self.noise = b""
+        self.noise = self.arrived = b""
 
     def run(self, seconds: float, latency_s=lambda: 0.0) -> list:
         samples = []
@@ -40,8 +41,13 @@ class Wire:
             self.device.delay_s = latency_s()
             arrived = self.device.receive(self.session.output()) + self.device.tick() + self.noise
             self.noise = b""
-            if arrived:
-                samples += self.session.receive(arrived)
+            self.arrived += arrived
+            # A polled session is looked after once per tick, any other one at every byte and often.
+            if getattr(self.session, "polled", False) and round(self.now * 1000) % round(self.session.tick_s * 1000):
+                continue
+            if self.arrived:
+                samples += self.session.receive(self.arrived)
+                self.arrived = b""
             self.session.tick()
         return samples
 
@@ -170,3 +176,40 @@ def test_any_bytes_are_survived_in_bounded_memory(steps):
         now += seconds
         session.tick()
         assert len(session.output()) <= 1 and session.pending <= 200
+
+
+@pytest.mark.parametrize("firmware", ["plain", "quoted", "ok", "ok-line"])
+def test_asked_all_at_once_every_firmware_is_read_fifty_times_a_second(firmware):
+    samples = Wire({"firmware": firmware}, kind=RosTmsBoardBurst).run(3.0, lambda: 0.003)
+    assert 85 <= len(samples) <= 100 and right(samples)  # after a second of quiet
+    assert not any(math.isnan(value) for sample in samples for value in sample.values)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32))
+def test_asked_all_at_once_no_answer_is_given_to_another_cell(seed):
+    """Late answers, garbage, cut frames and power cycles; every complete round that comes out is right."""
+    rng = random.Random(seed)
+    wire = Wire(kind=RosTmsBoardBurst)
+    samples = []
+    for _ in range(12):
+        match rng.randrange(5):
+            case 0:
+                wire.noise = rng.choice([b"\xff\xfe7\r\n", b"?2", b"999999\r\n", b"\r\n"])
+            case 1:
+                wire.device.cut_next = 1
+            case 2:
+                wire.device.garble_next = 1
+            case 3:
+                wire.device.power_cycle()
+        samples += wire.run(0.7, lambda: rng.choice([0.0, 0.001, 0.01, 0.04, 0.3]) if rng.random() < 0.01 else 0.001)
+    assert right(samples)
+    assert len(wire.run(4.0, lambda: 0.001)) > 50
+
+
+def test_asked_all_at_once_a_dead_cell_is_a_fault_that_says_what_to_do():
+    wire = Wire(kind=RosTmsBoardBurst, quiet_s=0.05)
+    assert wire.run(0.5)
+    wire.device.deaf = {2}
+    with pytest.raises(DeviceFault, match='3 answers to 4 questions, 10 times in a row; ask = "one"'):
+        wire.run(5.0)

@@ -1,0 +1,106 @@
+"""The board asked for all cells at once: an eighth of the cost, for firmware that queues what it is asked.
+
+Answers come in the order of the questions, so a round counts only where exactly as many whole lines came as were asked
+for, and nothing else until the next round. Anything else spoils the round, and nothing is asked until the line was
+quiet for a pause; it is long, since an answer that comes later than that would be given to another cell. Which cell is
+missing cannot be told: a board that does so again and again is a fault.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from tms_agents.devices.lines import LineParser
+from tms_agents.devices.loadboard.session import INDEX, LONGEST_LINE, answer_in, number_in
+from tms_agents.devices.loads import LoadSample
+from tms_agents.devices.outgoing import Outgoing
+from tms_agents.devices.transport import DeviceFault
+
+#: Spoiled rounds in a row after which the board is called faulty.
+_MOST_SPOILED = 10
+
+
+class RosTmsBoardBurst(Outgoing):
+    """Delivers a ``LoadSample`` of counts per round, one every ``period_s`` seconds, one round late.
+
+    ``reply_s``: answers later than this spoil the round; ``quiet_s``: pause after a spoiled one.
+
+    Raises:
+        ValueError: more cells than there are indices, or none.
+    """
+
+    polled = True
+
+    def __init__(
+        self,
+        *,
+        cells: int = 4,
+        period_s: float = 0.02,
+        reply_s: float = 0.06,
+        quiet_s: float = 1.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if not 1 <= cells <= len(INDEX):
+            raise ValueError(f"a board has 1 to {len(INDEX)} cells, not {cells}")
+        super().__init__()
+        self.frames, self.ready, self.tick_s = 0, False, period_s
+        self._cells, self._reply_s, self._quiet_s, self._clock = cells, reply_s, quiet_s, clock
+        self._lines = LineParser(LONGEST_LINE)
+        self._numbers: list[float] = []
+        self._asked_at: float | None = None
+        self._quiet_since: float | None = clock()  # what a former host asked for is thrown away first
+        self._complete: LoadSample | None = None
+        self._spoiled, self._got = 0, 0
+
+    def opened(self) -> None:
+        self._quiet_since = self._clock()
+
+    def receive(self, data: bytes) -> list[LoadSample]:
+        lines = self._lines.feed(data)
+        if self._quiet_since is not None:
+            self._quiet_since = self._clock()
+            return []
+        numbers = [number_in(answer) for line in lines if (answer := answer_in(line))]
+        self._numbers += [number for number in numbers if number is not None]
+        if None in numbers or len(self._numbers) > (self._cells if self._asked_at is not None else 0):
+            self._spoil()
+            return []
+        done = [] if self._complete is None else [self._complete]
+        self._complete = None
+        if len(self._numbers) == self._cells and not self._lines.pending:
+            self._complete = LoadSample(values=tuple(self._numbers))
+            self._numbers, self._asked_at, self._spoiled = [], None, 0
+            self.frames += self._cells
+            self.ready = True
+        return done
+
+    def tick(self) -> None:
+        now = self._clock()
+        if self._quiet_since is not None:
+            if now - self._quiet_since < self._quiet_s:
+                return
+            self._lines.expire()
+            self._quiet_since = None
+        if self._asked_at is None:
+            self._asked_at = now
+            self._output += INDEX[: self._cells].encode()
+        elif now - self._asked_at > self._reply_s:
+            self._spoil()
+
+    @property
+    def pending(self) -> int:
+        """Bytes of an incomplete line."""
+        return self._lines.pending
+
+    def _spoil(self) -> None:
+        answered = len(self._numbers)
+        self._numbers, self._asked_at, self._complete = [], None, None
+        self._quiet_since = self._clock()
+        # Silence is for the link to judge.
+        self._spoiled += bool(answered)
+        if self._spoiled >= _MOST_SPOILED:
+            raise DeviceFault(
+                f"{answered} answers to {self._cells} questions, {self._spoiled} times in a row;"
+                ' ask = "one" tells which cell is missing'
+            )
