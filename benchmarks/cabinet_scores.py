@@ -140,7 +140,7 @@ class Referee:
         for change in changes:
             self._on_board[change.name] = change
         pairs = sorted(
-            (self._distance(change, one), i, j)
+            (self._likeness(change, one), i, j)
             for i, change in enumerate(changes)
             for j, one in enumerate(self._left)
             if one.kind == "in"
@@ -148,7 +148,7 @@ class Referee:
         taken: dict[int, int] = {}
         for apart, i, j in pairs:
             one = self._left[j]
-            allowed = self._shared_in(one) or apart <= position_gate(self._world, changes[i])
+            allowed = self._shared_in(one) or apart[1] <= position_gate(self._world, changes[i])
             right_tag = not self._contestant.by_tag or one.stay == changes[i].tag
             if i not in taken and j not in taken.values() and allowed and right_tag:
                 taken[i] = j
@@ -204,7 +204,8 @@ class Referee:
 
     def _compare(self) -> None:
         """What stands on the board with what the contestant holds to stand there, nearest first."""
-        stays = self._contestant.standing()
+        standing = self._contestant.standing()
+        stays = dict(standing)
         pairs = sorted(
             (math.dist(thing.xy, xy), name, stay)
             for name, thing in self._on_board.items()
@@ -215,6 +216,9 @@ class Referee:
             if name in left and stay in stays and apart <= position_gate(self._world, left[name]):
                 thing = left.pop(name)
                 _, tag = stays.pop(stay)
+                if self._stay.get(name) not in standing and stay not in self._stay.values():
+                    # Put right after a false alarm and a miss that have been counted.
+                    self._stay[name] = stay
                 self.scores.placed += 1
                 self.scores.named += thing.tag is not None and tag == thing.tag
         self.scores.things += len(self._on_board)
@@ -245,6 +249,12 @@ class Referee:
 
     def _distance(self, change: Change, one: Detection) -> float:
         return math.dist(change.xy, self._last_xy[one.stay])
+
+    def _likeness(self, change: Change, one: Detection) -> tuple[int, float]:
+        """Nearest first; of stays that share one load, which have no place of their own, those with the right tag."""
+        tag = next((other.tag for other in self._left if other.kind == "identified" and other.stay == one.stay), None)
+        wrong = self._shared_in(one) and tag is not None and tag != change.tag
+        return (int(wrong), self._distance(change, one))
 
     def _shared_in(self, one: Detection) -> bool:
         return one.stay in self._shared

@@ -37,7 +37,14 @@ _CABINET = BoardParameters(tags=TagParameters(strangers=_STRANGERS))
 #: A refrigerator's board after the laboratory's other launch file, seen from above and moved to positive numbers.
 _FRIDGE_CELLS = ((0.02, 0.02), (0.33, 0.02), (0.02, 0.36), (0.33, 0.36))
 
+#: Slow changes are ramps: nobody presses, trembles, leans on the board or slides a thing; everything else as it is.
+_RAMPS = replace(_CABINET, hands=HandParameters(press_share=0.0, press_g=0.0, tremor_share=0.0))
+
 SCENES: dict[str, Scene] = {
+    # Noise, coarse counts, creep, vibration, antenna noise, missed and false reads, slow changes; one thing at a time,
+    # and two at once in 15 % of the episodes.
+    "ramps": Scene(board=_RAMPS, life=LifeParameters(pair_share=0.0, lean_share=0.0, slide_share=0.0)),
+    "ramps, pairs": Scene(board=_RAMPS, life=LifeParameters(lean_share=0.0, slide_share=0.0)),
     # One thing at a time, quick, all tagged and not light, nothing shakes, every tag is read every time, and a soft
     # board: a rigid one relieves far corners, which the absolute values of the laboratory's algorithm cannot see.
     "easy": Scene(

@@ -138,7 +138,7 @@ class Bookkeeper:
             return []
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
-        if settling.new and float(thing.load.sum()) < 0.4 * self._settings.min_weight_g:
+        if settling.new and float(thing.load.sum()) < 0.75 * self._settings.min_weight_g:
             # It was nothing after all.
             self.settling = None
             del self._shelf.things[thing.id]

@@ -26,7 +26,7 @@ class PutDensity:
     """Log density of a load vector (k,), per g^k, if it is that of one thing somewhere on the board."""
 
     def __init__(self, geometry: Geometry, least_g: float, weights: Sequence[KnownWeight] = ()) -> None:
-        self._geometry, self._least_g, self._weights = geometry, least_g, weights
+        self.geometry, self._least_g, self._weights = geometry, least_g, weights
         self._area = geometry.width * geometry.depth
         self._jacobian = float(np.linalg.slogdet(np.vstack([geometry.moments, geometry.twist]))[1])
 
@@ -34,12 +34,12 @@ class PutDensity:
         weight, sd2 = float(load.sum()), float(variance.sum())
         if weight < max(4.0 * math.sqrt(sd2), self._least_g):
             return -math.inf
-        place = off_board(load, variance, self._geometry) - math.log(self._area) - 2 * math.log(weight)
+        place = off_board(load, variance, self.geometry) - math.log(self._area) - 2 * math.log(weight)
         return self._weight(weight, sd2) + place + self._twist(load, variance, weight) + self._jacobian
 
     def of(self, weight: KnownWeight) -> PutDensity:
         """The same for a load of that weight."""
-        return PutDensity(self._geometry, self._least_g, [weight])
+        return PutDensity(self.geometry, self._least_g, [weight])
 
     def same_place(self, thing: Thing, step: Step, apart_m: float = 0.005) -> float:
         """Density of a further change where ``thing`` stands: it was still being put down, or pressed."""
@@ -47,9 +47,9 @@ class PutDensity:
         size = max(abs(weight), 1.0)
         if weight + float(thing.load.sum()) < self._least_g:
             return -math.inf
-        here = np.array(thing.centre(self._geometry).xy) - np.array(centre_free(step.change, self._geometry))
-        at = np.array(self._geometry.cells)
-        arms, own = (at - thing.centre(self._geometry).xy).T, float(thing.load.sum())
+        here = np.array(thing.centre(self.geometry).xy) - np.array(centre_free(step.change, self.geometry))
+        at = np.array(self.geometry.cells)
+        arms, own = (at - thing.centre(self.geometry).xy).T, float(thing.load.sum())
         cov = (arms * step.variance) @ arms.T / size**2 + (arms * thing.variance) @ arms.T / own**2
         cov = cov + np.eye(2) * apart_m**2
         place = -0.5 * float(here @ np.linalg.solve(cov, here)) - 0.5 * math.log(float(np.linalg.det(cov)))
@@ -64,7 +64,7 @@ class PutDensity:
     def slid(self, change: Array, load: Array, variance: Array) -> tuple[float, float]:
         """Densities of a step that makes ``load`` of a thing's load vector: with its weight, or still pressed."""
         weight, sd2, more = float(load.sum()), float(variance.sum()), float(change.sum())
-        place = off_board(load, variance, self._geometry) - math.log(self._area) - 2 * math.log(weight)
+        place = off_board(load, variance, self.geometry) - math.log(self._area) - 2 * math.log(weight)
         place += self._twist(load, variance, weight) + self._jacobian
         still = -0.5 * (more**2 / sd2 + math.log(2 * math.pi * sd2))
         return still + place, -math.log(weight) + place
@@ -86,7 +86,7 @@ class PutDensity:
         return math.log(0.5 * math.exp(broad) + 0.5 * peaks / len(self._weights))
 
     def _twist(self, load: Array, variance: Array, weight: float) -> float:
-        twist = self._geometry.twist
+        twist = self.geometry.twist
         if not len(twist):
             return 0.0
         # A soft board gives a corner more than its share: up to half the weight, a fifth of it on average.

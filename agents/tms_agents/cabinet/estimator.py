@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
 
+from tms_agents.cabinet.balance import Balance, search
 from tms_agents.cabinet.blocks import Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
 from tms_agents.cabinet.events import CabinetEvent, Stay
@@ -22,6 +24,11 @@ from tms_agents.cabinet.steps import Step, StepDetector
 
 #: An unclear level that the load left sooner than this was one in passing.
 _PASSING_S = 0.8
+#: How long the load must rest before its sum is believed, how sure another explanation must be, and how long a lifted
+#: thing's tag may stay in view in the hand.
+_BALANCE_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 0.9, 0.8
+#: A gap in the samples may be a board without power, whose zeros then jump by about so much.
+_JUMP_G = 6.0
 
 
 class CabinetEstimator:
@@ -49,9 +56,11 @@ class CabinetEstimator:
         self._connect()
         self._interrupted: float | None = None
         self._looked = -math.inf
+        self._rested = -math.inf
 
     def _connect(self) -> None:
         self._book = Bookkeeper(self._shelf, self._settings)
+        self._balance = Balance(self._shelf, self._settings)
         self._namer = Namer(self._shelf, self._presence, self._zones, self._known, self._settings)
 
     # --- input
@@ -79,10 +88,9 @@ class CabinetEstimator:
         step = self._detector.push(block)
         if step is not None:
             return self._explain(step)
-        if self._detector.resting and t - self._looked > 0.5 and self._book.settling is not None:
+        if self._detector.resting and t - self._looked > 0.5:
             self._looked = t
-            level, variance, _ = self._detector.resting_level()
-            return self._book.rest(t, level, variance)
+            return self._rest(t)
         return []
 
     def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[CabinetEvent]:
@@ -126,17 +134,58 @@ class CabinetEstimator:
         """Whether the load is steady and everything about it told."""
         return self._detector.resting and not self._blocks.unusable
 
+    # --- at rest
+
+    def _rest(self, t: float) -> list[CabinetEvent]:
+        level, variance, seconds = self._detector.resting_level()
+        if seconds <= 0:
+            return []
+        events = self._book.rest(t, level, variance)
+        if seconds < _BALANCE_S:
+            return events
+        step = self._balance.rest(t, level, variance)
+        return events if step is None else events + self._correct(step)
+
+    def _correct(self, step: Step) -> list[CabinetEvent]:
+        """The sum of the stays is not what the cells show: what is more probable?"""
+        best = search(step, self._shelf, self._recent_evidence(), self._settings)[0]
+        if best.kind == "unknown" or best.score < _BALANCE_SURE:
+            return []
+        return self._apply(step, best)
+
+    def _recent_evidence(self) -> Evidence:
+        def taken(thing: Thing) -> float:
+            if thing.tag is None:
+                return 0.0
+            return self._presence.taken(thing.tag, max(self._rested, thing.since) + _IN_HAND_S, 0.01)
+
+        return Evidence(taken, self._namer.loose())
+
     # --- a step of the load
 
     def _explain(self, step: Step) -> list[CabinetEvent]:
         final = self._detector.is_final(step)
         steady = step.now - step.settled
         waited = math.inf if final else steady
-        explanations = explain(step, self._shelf, self._evidence(step), self._settings)
+        whole = self._whole(step)
+        evidence = self._evidence(step)
+        if whole is not None:
+            evidence = replace(evidence, left=(whole.change, whole.variance))
+        explanations = explain(step, self._shelf, evidence, self._settings)
         if steady > self._settings.patience_s and waited > self._settings.stubborn_s:
             # No hand presses for so long.
             explanations = [item for item in explanations if item.kind != "press"]
         best, *others = explanations
+        if best.kind == "settled":
+            self._detector.accept(step)
+            self._rested = step.settled
+            return []
+        if best.kind == "unknown" and _BALANCE_S < steady and not final and whole is not None:
+            self._rested = step.settled
+            other = search(whole, self._shelf, self._recent_evidence(), self._settings)[0]
+            if other.kind != "unknown" and other.score > _BALANCE_SURE:
+                self._detector.accept(step)
+                return self._apply(whole, other)
         if best.kind in ("unknown", "press"):
             if waited < self._settings.stubborn_s:
                 self._detector.hold(step)
@@ -158,10 +207,18 @@ class CabinetEstimator:
             self._book.doubt(step, best, others)
         return self._take(step, best)
 
+    def _whole(self, step: Step) -> Step | None:
+        """All that the stays and the zeros leave unexplained after ``step``, not only what is new."""
+        if self._balance.zero is None:
+            return None
+        level, variance = step.before + step.change, step.variance - step.before_variance
+        return self._balance.compare(step.onset, step.settled, step.now, level, variance)
+
     def _unclear(self, step: Step, best: Explanation) -> bool:
         if not best.several:
             return best.score < 0.9 or not best.tight
-        tags = [thing.tag for thing in best.removed if thing.tag is not None]
+        touched = best.removed if best.thing is None else (*best.removed, best.thing)
+        tags = [thing.tag for thing in touched if thing.tag is not None]
         heard = all(any(self._presence.rounds(tag, step.settled)) for tag in tags)
         return best.score < 0.97 or not heard
 
@@ -185,11 +242,17 @@ class CabinetEstimator:
         return not fits and not _PASSING_S < waited < math.inf
 
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
+        self._detector.accept(step)
+        return self._apply(step, explanation)
+
+    def _apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         for thing in explanation.removed:
             at = thing.centre(self._geometry)
             self._namer.left(thing, step.settled, at.weight_g, at.weight_sd_g)
+        self._balance.removed(explanation.removed, step.now, tight=explanation.tight)
+        self._rested = step.settled
+        self._book.newest = []
         events = self._book.apply(step, explanation)
-        self._detector.accept(step)
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
         return events + self._namer.update(step.now, resting=self._detector.resting)
@@ -208,6 +271,7 @@ class CabinetEstimator:
     def _drifted(self, seconds: float) -> None:
         rate = self._settings.creep_per_hour * (np.abs(self._shelf.total()) + 500.0)
         self._detector.level.loosen((rate * max(seconds, 0.0) / 3600.0) ** 2)
+        self._balance.loosen(_JUMP_G)
 
     # --- across restarts
 
@@ -217,6 +281,7 @@ class CabinetEstimator:
         return {
             "format": 1,
             "shelf": self._shelf.to_dict(),
+            "balance": self._balance.to_dict(),
             "level": self._detector.level.mean.tolist() if self._detector.level.known else None,
             "noise": None if np.isnan(noise).any() else noise.tolist(),
             "learned": {tag: [w.mean_g, w.sd_g] for tag, w in self._namer.learned.items()},
@@ -243,6 +308,9 @@ class CabinetEstimator:
             self = cls(geometry, settings, known, zones=zones)
             self._shelf = Shelf.from_dict(geometry, state["shelf"])
             self._connect()
+            if "balance" in state:
+                self._balance.restore(state["balance"])
+                self._balance.loosen(_JUMP_G)
             self._namer.learned = {tag: KnownWeight(*pair) for tag, pair in state["learned"].items()}
             if state["noise"] is not None:
                 self._noise.variance = np.array(state["noise"], dtype=float)

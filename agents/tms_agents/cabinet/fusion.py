@@ -21,14 +21,14 @@ from typing import Literal
 import numpy as np
 
 from tms_agents.cabinet.densities import PutDensity, normal
-from tms_agents.cabinet.geometry import Array, KnownWeight
-from tms_agents.cabinet.position import centre_free
+from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
+from tms_agents.cabinet.position import centre, centre_free
 from tms_agents.cabinet.settings import EstimatorSettings
-from tms_agents.cabinet.splitting import path_odds, split
+from tms_agents.cabinet.splitting import Split, path_odds, split
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step
 
-Kind = Literal["unknown", "put", "take", "slide", "swap", "adjust", "press", "two", "joint"]
+Kind = Literal["unknown", "settled", "put", "take", "slide", "swap", "adjust", "press", "two", "joint"]
 
 #: Prior probabilities of what happens in one step. Two things at once are rare, one thing slid without lifting too.
 _PRIOR: dict[Kind, float] = {
@@ -39,6 +39,7 @@ _PRIOR: dict[Kind, float] = {
     "adjust": 0.3,
     "press": 0.1,
     "unknown": 1e-4,
+    "settled": 0.3,
 }
 _TWO_TAKEN = 0.03
 #: Two things put at once: usually, and while two tags that are at no stay are in view.
@@ -50,6 +51,8 @@ _PRESSED_SLIDE = 0.03
 _LOOSE = 0.01
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
 _HAND_M, _CROWDED_M = 0.015, 0.03
+#: Two things put at once stand so far apart at least; nearer, it was one that was tilted (log-odds of the price).
+_ONE_M, _TWO_M, _TILTED = 0.05, 0.075, -8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,6 +99,8 @@ class Evidence:
     settling: Thing | None = None
     settling_share: float = 0.0
     doubts: Sequence[Doubt] = ()
+    #: What the load is beside zeros and stays after the step, (k,) g, and its variance: None while not known.
+    left: tuple[Array, Array] | None = None
 
 
 def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
@@ -112,6 +117,10 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         Explanation("put", math.log(_PRIOR["put"]) + put(change, variance) + crowded(change), load=change),
         Explanation("unknown", math.log(_PRIOR["unknown"]) + put.anything(change, variance)),
     ]
+    if evidence.left is not None:
+        # It makes good what was wrong before, so that everything fits now.
+        settled = math.log(_PRIOR["settled"]) + normal(*evidence.left)
+        found.append(Explanation("settled", settled))
     each = math.log(1.0 / max(len(things), 1))
     noises = [thing.at(step.now, settings.creep_per_hour) for thing in things]
     taken = [evidence.taken(thing) for thing in things]
@@ -124,10 +133,11 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         after = put(left, both)
         if after > -math.inf:
             prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
-            crowd = crowded(left, thing)
+            # A thing half lifted or tilted looks like a lighter one in its place.
+            crowd = crowded(left)
             found.append(Explanation("swap", prior + after + crowd, removed=(thing,), load=left))
             if settings.knows_places and abs(step.weight_g) < 0.5 * float(thing.load.sum()):
-                prior = math.log(_PRIOR["slide"]) + each
+                prior = math.log(_PRIOR["slide"]) + each - max(tag, 0.0)
                 prior += max(path_odds(step, -thing.load, same_thing=True), 0.0)
                 still, pressed = put.slid(change, left, both)
                 found.append(Explanation("slide", prior + still, thing=thing, load=left))
@@ -208,7 +218,14 @@ def _two_put(step: Step, put: PutDensity, loose: Mapping[str, KnownWeight | None
     parts = split(step)
     if parts is not None:
         volume = 0.5 * float(np.log(2 * math.pi * parts.variance).sum())
-        score = prior + parts.gain + put(parts.first, parts.variance) + put(parts.second, parts.variance) + volume
+        score = (
+            prior
+            + parts.gain
+            + _tilted(parts, put.geometry)
+            + put(parts.first, parts.variance)
+            + put(parts.second, parts.variance)
+            + volume
+        )
         if score > -math.inf:
             found.append(Explanation("two", score, load=parts.first, second=parts.second, variance=parts.variance))
     known = [(tag, weight) for tag, weight in loose.items() if weight is not None][-_LOOSE_TRIED:]
@@ -220,6 +237,13 @@ def _two_put(step: Step, put: PutDensity, loose: Mapping[str, KnownWeight | None
         load, second = share * step.change, (1 - share) * step.change
         found.append(Explanation("joint", score, load=load, second=second, tags=(tag, other)))
     return found
+
+
+def _tilted(parts: Split, geometry: Geometry) -> float:
+    """Log of how probable it is that two things stand as near to each other as the parts of a step."""
+    one, two = (centre(load, parts.variance, geometry) for load in (parts.first, parts.second))
+    apart = math.dist(one.xy, two.xy) + math.sqrt(one.cov[0] + one.cov[2] + two.cov[0] + two.cov[2])
+    return _TILTED * min(max((_TWO_M - apart) / (_TWO_M - _ONE_M), 0.0), 1.0)
 
 
 def _normalised(found: list[Explanation]) -> list[Explanation]:

@@ -1,0 +1,156 @@
+"""Mass balance: at rest the cells show their zeros and the sum of all loads. If they do not, an explanation was wrong.
+
+The zero of every cell is followed by a Kalman filter: it drifts and creeps slowly, and every thing that is taken leaves
+the error of its load behind. When the load at rest is beyond what that allows, every set of stays that may be over is
+tried, with and without one new thing, and one stay that was measured badly or slid. Tags that are read or missed count.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tms_agents.cabinet.densities import PutDensity, normal
+from tms_agents.cabinet.fusion import Evidence, Explanation
+from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.stays import Shelf, Thing
+from tms_agents.cabinet.steady import chi_square_limit
+from tms_agents.cabinet.steps import Step
+
+#: Prior odds: a stay is over and nobody told, a thing is there and nobody told, a stay was measured badly, or slid.
+_OVER, _NEW, _MEASURED, _SLID = 0.02, 0.05, 0.05, 1e-3
+#: ... something else, and that the zeros have moved by some grams.
+_UNKNOWN, _MOVED, _MOVED_G = 1e-3, 0.02, 8.0
+#: The zero moves by so much per square root of an hour, a resting level is never better known than this, g.
+_WALK_G, _FLOOR_G = 6.0, 1.0
+#: Up to so many stays may be over at once.
+_MOST_OVER, _MANY = 3, 10
+#: What nothing explains for so long is a zero that has moved.
+_GIVEN_UP_S = 60.0
+
+
+class Balance:
+    """The zeros, (k,) g, and what the load at rest says against the sum of the stays."""
+
+    def __init__(self, shelf: Shelf, settings: EstimatorSettings) -> None:
+        self._shelf, self._settings = shelf, settings
+        self.zero: Array | None = None
+        self.variance: Array = np.zeros(shelf.geometry.count)
+        self._seen = -math.inf
+        self._off_since: float | None = None
+        self._whole_limit = chi_square_limit(settings.change_sd, shelf.geometry.count) / settings.change_sd**2
+
+    def removed(self, things: Sequence[Thing], now: float, *, tight: bool = True) -> None:
+        """What these things weighed was not known exactly: the zero is not, either, after they have gone."""
+        for thing in things:
+            self.variance = self.variance + thing.at(now, self._settings.creep_per_hour)
+            if not tight:
+                self.variance = self.variance + (0.05 * np.abs(thing.load) + 4.0) ** 2
+
+    def loosen(self, grams: float) -> None:
+        """The zeros may have jumped by so much each."""
+        self.variance = self.variance + grams**2
+
+    def rest(self, now: float, level: Array, variance: Array) -> Step | None:
+        """The load rests at ``level``, (k,) g: follow the zero, or return what is too much or too little."""
+        if self.zero is None:
+            self.zero, self.variance, self._seen = level - self._shelf.total(), variance + _FLOOR_G**2, now
+            return None
+        step = self.compare(now, now, now, level, variance)
+        if not self.off(step):
+            self._off_since = None
+            gain = self.variance / (self.variance + variance + _FLOOR_G**2)
+            self.zero = self.zero + gain * step.change
+            self.variance = (1 - gain) * self.variance
+            return None
+        if self._off_since is None:
+            self._off_since = now
+        if now - self._off_since > _GIVEN_UP_S:
+            self.zero, self.variance, self._off_since = level - self._shelf.total(), variance + _FLOOR_G**2, None
+            return None
+        return step
+
+    def compare(self, onset: float, settled: float, now: float, level: Array, variance: Array) -> Step:
+        """The step from what the stays make of the zeros to ``level``."""
+        assert self.zero is not None
+        self._walk(now)
+        before = self.zero + self._shelf.total()
+        none = np.zeros((0, len(level)))
+        both = variance + self.variance + _FLOOR_G**2
+        return Step(onset, settled, now, level - before, both, before, self.variance, none, none, 1.0)
+
+    def _walk(self, now: float) -> None:
+        hours = max(now - self._seen, 0.0) / 3600.0 if self._seen > -math.inf else 0.0
+        self._seen = now
+        # Creep of what stands there: a random walk that has gone through its share of the load after an hour.
+        creep = 3 * self._settings.creep_per_hour * np.abs(self._shelf.total())
+        self.variance = self.variance + (_WALK_G**2 + creep**2) * hours
+
+    def off(self, step: Step) -> bool:
+        total = step.weight_g**2 / float(step.variance.sum())
+        whole = float((step.change**2 / step.variance).sum()) / self._whole_limit
+        return max(total, whole) > self._settings.change_sd**2
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "zero": None if self.zero is None else self.zero.tolist(),
+            "variance": self.variance.tolist(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        if state["zero"] is not None:
+            self.zero = np.array(state["zero"], dtype=float)
+            self.variance = np.array(state["variance"], dtype=float)
+
+
+def search(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
+    """Explanations of ``step``, which is what the stays leave unexplained; the most probable first."""
+    things = list(shelf.things.values())
+    weights = [weight for weight in evidence.loose.values() if weight is not None]
+    put = PutDensity(shelf.geometry, settings.min_weight_g, weights)
+    taken = {thing.id: evidence.taken(thing) for thing in things}
+    spreads = {thing.id: thing.at(step.now, settings.creep_per_hour) for thing in things}
+    moved = math.log(_MOVED) + normal(step.change, step.variance + _MOVED_G**2)
+    other = math.log(_UNKNOWN) + put.anything(step.change, step.variance)
+    found = [Explanation("unknown", float(np.logaddexp(moved, other)))]
+    most = _MOST_OVER if len(things) <= _MANY else 2
+    sets = [those for n in range(min(most, len(things)) + 1) for those in itertools.combinations(things, n)]
+    if len(things) > most:
+        sets.append(tuple(things))
+    for those in sets:
+        left = step.change + sum((thing.load for thing in those), np.zeros_like(step.change))
+        variance = step.variance + sum((spreads[thing.id] for thing in those), np.zeros_like(step.change))
+        prior = sum(math.log(_OVER) + taken[thing.id] for thing in those)
+        if those:
+            found.append(Explanation("take", prior + normal(left, variance), removed=those))
+        score = put(left, variance)
+        if score > -math.inf:
+            kind = "swap" if those else "put"
+            found.append(Explanation(kind, prior + math.log(_NEW) + score, removed=those, load=left))
+    if settings.knows_places:
+        found += _measured_badly(step, things, spreads, taken, put)
+    top = max(item.score for item in found)
+    total = sum(math.exp(item.score - top) for item in found)
+    ranked = sorted(found, key=lambda item: -item.score)
+    return [replace(item, score=math.exp(item.score - top) / total) for item in ranked]
+
+
+def _measured_badly(
+    step: Step, things: Sequence[Thing], spreads: dict[int, Array], taken: dict[int, float], put: PutDensity
+) -> list[Explanation]:
+    found = []
+    for thing in things:
+        left = step.change + thing.load
+        if float(left.sum()) < 1.0:
+            continue
+        score = math.log(_MEASURED) + put.same_place(thing, step)
+        found.append(Explanation("adjust", score, thing=thing, load=left))
+        still, _ = put.slid(step.change, left, step.variance + spreads[thing.id])
+        found.append(Explanation("slide", math.log(_SLID) + still - max(taken[thing.id], 0.0), thing=thing, load=left))
+    return found
