@@ -107,7 +107,7 @@ def test_ctrl_c_leaves_cleanly_and_stops_server_and_agents(tmp_path: Path) -> No
     out = ""
     for line in demo.stdout:
         out += line
-        if line.startswith("(0)"):
+        if line.startswith("Things are put"):
             break
     assert len(running(out)) == 4
     demo.send_signal(signal.SIGINT)

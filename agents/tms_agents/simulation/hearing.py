@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from tms_agents.simulation.room import FLOOR_AGENT, ROBOT_AGENT
 from tms_agents.simulation.script import Told
 from tms_agents.simulation.world import Gripped, InCabinet, OnFloor, OnTable, Place, World
-from tms_client import NotFound, Town
+from tms_client import Town
 from tms_schemas.belief import LabelsAnswer
 from tms_schemas.events import Kind
 
@@ -38,9 +38,8 @@ class Hearing:
 
     def _unconnected(self, world: World) -> str:
         for agent in (*world.cabinets, ROBOT_AGENT):
-            try:
-                view = self._town.agents.get(agent)
-            except NotFound:
+            view = self._town.agents.get(agent)
+            if view.state == "unknown":
                 return f"agent {agent} has not said anything"
             if view.state != "connected":
                 return f"agent {agent} is {view.state}: {view.why}"
@@ -82,8 +81,10 @@ def _there(world: World) -> Mapping[tuple[str | None, Kind], int]:
         return sum(isinstance(place, kind) for place in places)
 
     there: dict[tuple[str | None, Kind], int] = {
+        (cabinet, "cabinet"): len(world.inside(cabinet)) for cabinet in world.cabinets
+    }
+    return there | {
         (FLOOR_AGENT, "floor"): count(OnFloor),
         (ROBOT_AGENT, "robot"): count(Gripped),
         (ROBOT_AGENT, "table"): count(OnTable),
     }
-    return there | {(cabinet, "cabinet"): len(world.inside(cabinet)) for cabinet in world.cabinets}

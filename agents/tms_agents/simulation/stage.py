@@ -22,9 +22,11 @@ from tms_agents.simulation.world import World
 from tms_client import Pace, Poster, Spool, Town
 from tms_schemas.observation import Observation
 
+UTC_NOW: Callable[[], datetime] = functools.partial(datetime.now, UTC)
+
 
 class Stage:
-    """``player`` plays scripts in the room, ``configs`` are the agents' files; made by ``staged``."""
+    """The senses of a ``Player`` (see there); ``configs`` are the agents' files. Made by ``staged``."""
 
     def __init__(
         self, town: Town, room: str, hardware: Hardware, agents: Agents, poster: Poster, configs: Mapping[str, Path]
@@ -32,8 +34,6 @@ class Stage:
         self.hardware, self.agents, self.configs = hardware, agents, configs
         self._hearing = Hearing(town, room)
         self._poster = poster
-
-    # what the player needs (player.Senses)
 
     def follow(self, world: World) -> None:
         self.hardware.follow(world)
@@ -48,9 +48,6 @@ class Stage:
         if len(self._poster.spool):
             return f"agent {FLOOR_AGENT} cannot deliver: {self._poster.trouble or 'no answer'}"
         return self._hearing.late(world, wish)
-
-
-UTC_NOW: Callable[[], datetime] = functools.partial(datetime.now, UTC)
 
 
 @contextmanager

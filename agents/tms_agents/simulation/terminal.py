@@ -8,6 +8,7 @@ from typing import TextIO
 
 from tms_agents.simulation import pies
 from tms_agents.simulation.hardware import Plugs
+from tms_agents.simulation.processes import command
 
 
 class Terminal:
@@ -27,10 +28,10 @@ class Terminal:
         """One line per agent: its emulated devices, where they are plugged in, and how it was started."""
         self.say("\nThe agents read emulated devices; name your own in such a file to use them instead:")
         for agent, plug in plugs.items():
-            kind = "hand" if plug.states else "cabinet"
+            start = " ".join(["tms", *command(agent, configs[agent])])
             board = f"load cells {plug.loads}, " if plug.loads else ""
             states = f", joints and fingers tcp {plug.states[0]}:{plug.states[1]}" if plug.states else ""
-            self.say(f"  {agent}: {board}TR3 {plug.reader}{states}; tms agent {kind} --config {configs[agent]}")
+            self.say(f"  {agent}: {board}TR3 {plug.reader}{states}; {start}")
         self.say("Things are put into the cabinets, one by one; boards and readers take their time ...")
 
     def step(self, number: int, title: str) -> None:
