@@ -126,10 +126,13 @@ class Bookkeeper:
                 partner.joint = partner.joint - {thing.id}
                 if len(partners) == 1:
                     partner.variance, partner.joint = step.variance * 2, frozenset()
-        if alone:
-            return Vanished(step.now, thing.id, -step.weight_g, float(np.sqrt(step.variance.sum())))
         at = thing.centre(self._shelf.geometry)
-        return Vanished(step.now, thing.id, at.weight_g, at.weight_sd_g)
+        if not alone:
+            return Vanished(step.now, thing.id, at.weight_g, at.weight_sd_g)
+        # Weighed twice: while it stood there for long, and by what is missing now, when a hand may still pull.
+        stood, missing = 1 / max(at.weight_sd_g, 1e-3) ** 2, 1 / float(step.variance.sum())
+        weight_g = (stood * at.weight_g - missing * step.weight_g) / (stood + missing)
+        return Vanished(step.now, thing.id, weight_g, math.sqrt(1 / (stood + missing)))
 
     def rest(self, now: float, level: Array, variance: Array) -> list[CabinetEvent]:
         """The load rests at ``level``: sharpen the thing that was put last."""
