@@ -13,7 +13,7 @@ from tms_schemas.rooms import RoomIn
 Polygon = list[list[float]]
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")  # a tag that one module registers is unknown in another
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     with ServerProcess(tmp_path_factory.mktemp("server")) as server:
         yield server

@@ -23,6 +23,7 @@ T_co = TypeVar("T_co", covariant=True)
 _MAX_UNSENT_BYTES = 1 << 16
 _READ_BYTES = 1 << 16
 _SHORTEST_TICK_S = 0.001
+_LAST_WORD_S = 0.1
 
 
 class DeviceFault(Exception):
@@ -95,6 +96,10 @@ class Stream:
     async def close(self) -> None:
         self.close_all()
         await asyncio.sleep(0)  # transports close in the next turn of the loop
+        if self.transport.get_write_buffer_size():  # a last word that nobody takes must not keep a dead line open
+            await asyncio.sleep(_LAST_WORD_S)
+            self.transport.abort()
+            await asyncio.sleep(0)
 
 
 Opener = Callable[[], Awaitable[Stream]]
