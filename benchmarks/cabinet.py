@@ -33,7 +33,7 @@ CONTESTANTS: dict[str, Callable[[BoardWorld, dict[str, KnownWeight]], Contestant
     "laboratory": Laboratory,
 }
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "cabinet_position.png"
-DEV_SEEDS, UNSEEN_SEEDS = range(5), range(1000, 1005)
+DEV_SEEDS, UNSEEN_SEEDS, RAMPS_SEEDS = range(5), range(1000, 1005), range(2000, 2005)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +99,14 @@ def _precision(job: tuple[str, int, int]) -> Precision:
 
 
 def events(pool: ProcessPoolExecutor, changes: int) -> None:
-    """All scenes, five seeds each for the known ones, and one for each unseen one in every round of five."""
-    plan = [(scene, seed) for scene in SCENES for seed in DEV_SEEDS]
-    plan += [(scene, seed) for scene in UNSEEN for seed in UNSEEN_SEEDS]
+    """All scenes, five seeds each; ramps also with seeds that were not looked at."""
+    rows = {scene: (scene, DEV_SEEDS) for scene in SCENES}
+    rows |= {f"{scene}, unseen seeds": (scene, RAMPS_SEEDS) for scene in SCENES if scene.startswith("ramps")}
+    rows |= {scene: (scene, UNSEEN_SEEDS) for scene in UNSEEN}
     jobs = [
-        Job(scene, name, seed, changes if scene == "cabinet" else max(changes // 5, 40))
-        for scene, seed in plan
+        Job(scene, name, seed, changes if scene.startswith(("cabinet", "ramps")) else max(changes // 5, 40))
+        for scene, seeds in rows.values()
+        for seed in seeds
         for name in CONTESTANTS
     ]
     scores = dict(zip(jobs, pool.map(judged, jobs), strict=True))
@@ -113,12 +115,13 @@ def events(pool: ProcessPoolExecutor, changes: int) -> None:
         "| scene | changes | by | precision | recall | single: precision, recall | two at once: precision, recall "
         "| in place | named | phantoms |\n|---|---|---|---|---|---|---|---|---|---|"
     )
-    for scene in [*SCENES, *UNSEEN]:
+    for title, (scene, seeds) in rows.items():
         for name in CONTESTANTS:
-            mine = [score for job, score in scores.items() if (job.scene, job.contestant) == (scene, name)]
-            count = sum(job.changes for job in jobs if (job.scene, job.contestant) == (scene, name))
+            these = [job for job in jobs if (job.scene, job.contestant) == (scene, name) and job.seed in seeds]
+            mine = [scores[job] for job in these]
+            count = sum(job.changes for job in these)
             print(
-                f"| {scene} | {count} | {name} | {_spread([s.precision() for s in mine])} "
+                f"| {title} | {count} | {name} | {_spread([s.precision() for s in mine])} "
                 f"| {_spread([s.recall() for s in mine])} "
                 f"| {_spread([s.precision(None, 'single') for s in mine])}, "
                 f"{_spread([s.recall(None, 'single') for s in mine])} "

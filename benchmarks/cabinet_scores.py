@@ -216,7 +216,8 @@ class Referee:
             if name in left and stay in stays and apart <= position_gate(self._world, left[name]):
                 thing = left.pop(name)
                 _, tag = stays.pop(stay)
-                if self._stay.get(name) not in standing and stay not in self._stay.values():
+                wrong = not self._contestant.by_tag and self._stay.get(name) not in standing
+                if wrong and stay not in self._stay.values():
                     # Put right after a false alarm and a miss that have been counted.
                     self._stay[name] = stay
                 self.scores.placed += 1

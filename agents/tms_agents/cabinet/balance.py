@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from tms_agents.cabinet.densities import PutDensity, normal
-from tms_agents.cabinet.fusion import Evidence, Explanation
+from tms_agents.cabinet.fusion import Evidence, Explanation, Kind
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
@@ -24,7 +24,7 @@ from tms_agents.cabinet.steady import chi_square_limit
 from tms_agents.cabinet.steps import Step
 
 #: Prior odds: a stay is over and nobody told, a thing is there and nobody told, a stay was measured badly, or slid.
-_OVER, _NEW, _MEASURED, _SLID = 0.02, 0.05, 0.05, 1e-3
+_OVER, _NEW, _MEASURED, _LATE_MEASURED, _SLID = 0.02, 0.05, 0.05, 0.003, 1e-3
 #: ... something else, and that the zeros have moved by some grams.
 _UNKNOWN, _MOVED, _MOVED_G = 1e-3, 0.02, 8.0
 #: The zero moves by so much per square root of an hour, a resting level is never better known than this, g.
@@ -44,6 +44,8 @@ class Balance:
         self.variance: Array = np.zeros(shelf.geometry.count)
         self._seen = -math.inf
         self._off_since: float | None = None
+        #: When the sum was right last.
+        self.right_at = -math.inf
         self._whole_limit = chi_square_limit(settings.change_sd, shelf.geometry.count) / settings.change_sd**2
 
     def removed(self, things: Sequence[Thing], now: float, *, tight: bool = True) -> None:
@@ -51,7 +53,7 @@ class Balance:
         for thing in things:
             self.variance = self.variance + thing.at(now, self._settings.creep_per_hour)
             if not tight:
-                self.variance = self.variance + (0.05 * np.abs(thing.load) + 4.0) ** 2
+                self.variance = self.variance + (0.02 * np.abs(thing.load) + 2.0) ** 2
 
     def loosen(self, grams: float) -> None:
         """The zeros may have jumped by so much each."""
@@ -64,7 +66,7 @@ class Balance:
             return None
         step = self.compare(now, now, now, level, variance)
         if not self.off(step):
-            self._off_since = None
+            self._off_since, self.right_at = None, now
             gain = self.variance / (self.variance + variance + _FLOOR_G**2)
             self.zero = self.zero + gain * step.change
             self.variance = (1 - gain) * self.variance
@@ -109,8 +111,13 @@ class Balance:
             self.variance = np.array(state["variance"], dtype=float)
 
 
-def search(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
-    """Explanations of ``step``, which is what the stays leave unexplained; the most probable first."""
+def search(
+    step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings, right_at: float = -math.inf
+) -> list[Explanation]:
+    """Explanations of ``step``, which is what the stays leave unexplained; the most probable first.
+
+    ``right_at``: what stood there when the sum was right was measured well.
+    """
     things = list(shelf.things.values())
     weights = [weight for weight in evidence.loose.values() if weight is not None]
     put = PutDensity(shelf.geometry, settings.min_weight_g, weights)
@@ -131,10 +138,10 @@ def search(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSett
             found.append(Explanation("take", prior + normal(left, variance), removed=those))
         score = put(left, variance)
         if score > -math.inf:
-            kind = "swap" if those else "put"
+            kind: Kind = "swap" if those else "put"
             found.append(Explanation(kind, prior + math.log(_NEW) + score, removed=those, load=left))
     if settings.knows_places:
-        found += _measured_badly(step, things, spreads, taken, put)
+        found += _measured_badly(step, things, spreads, taken, put, right_at)
     top = max(item.score for item in found)
     total = sum(math.exp(item.score - top) for item in found)
     ranked = sorted(found, key=lambda item: -item.score)
@@ -142,14 +149,19 @@ def search(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSett
 
 
 def _measured_badly(
-    step: Step, things: Sequence[Thing], spreads: dict[int, Array], taken: dict[int, float], put: PutDensity
+    step: Step,
+    things: Sequence[Thing],
+    spreads: dict[int, Array],
+    taken: dict[int, float],
+    put: PutDensity,
+    right_at: float,
 ) -> list[Explanation]:
     found = []
     for thing in things:
         left = step.change + thing.load
         if float(left.sum()) < 1.0:
             continue
-        score = math.log(_MEASURED) + put.same_place(thing, step)
+        score = math.log(_MEASURED if thing.since > right_at else _LATE_MEASURED) + put.same_place(thing, step)
         found.append(Explanation("adjust", score, thing=thing, load=left))
         still, _ = put.slid(step.change, left, step.variance + spreads[thing.id])
         found.append(Explanation("slide", math.log(_SLID) + still - max(taken[thing.id], 0.0), thing=thing, load=left))

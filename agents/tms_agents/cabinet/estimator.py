@@ -27,6 +27,10 @@ _PASSING_S = 0.8
 #: How long the load must rest before its sum is believed, how sure another explanation must be, and how long a lifted
 #: thing's tag may stay in view in the hand.
 _BALANCE_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 0.9, 0.8
+#: Rounds that must have told of a tag before its thing is one of several that changed at once.
+_HEARD = 2
+#: Several at once are believed only at a level that is no pause between them.
+_SEVERAL_S = 0.7
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
 _JUMP_G = 6.0
 
@@ -148,7 +152,7 @@ class CabinetEstimator:
 
     def _correct(self, step: Step) -> list[CabinetEvent]:
         """The sum of the stays is not what the cells show: what is more probable?"""
-        best = search(step, self._shelf, self._recent_evidence(), self._settings)[0]
+        best = search(step, self._shelf, self._recent_evidence(), self._settings, self._balance.right_at)[0]
         if best.kind == "unknown" or best.score < _BALANCE_SURE:
             return []
         return self._apply(step, best)
@@ -180,9 +184,9 @@ class CabinetEstimator:
             self._detector.accept(step)
             self._rested = step.settled
             return []
-        if best.kind == "unknown" and _BALANCE_S < steady and not final and whole is not None:
+        if best.kind == "unknown" and steady > _BALANCE_S and not final and whole is not None:
             self._rested = step.settled
-            other = search(whole, self._shelf, self._recent_evidence(), self._settings)[0]
+            other = search(whole, self._shelf, self._recent_evidence(), self._settings, self._balance.right_at)[0]
             if other.kind != "unknown" and other.score > _BALANCE_SURE:
                 self._detector.accept(step)
                 return self._apply(whole, other)
@@ -219,8 +223,13 @@ class CabinetEstimator:
             return best.score < 0.9 or not best.tight
         touched = best.removed if best.thing is None else (*best.removed, best.thing)
         tags = [thing.tag for thing in touched if thing.tag is not None]
-        heard = all(any(self._presence.rounds(tag, step.settled)) for tag in tags)
-        return best.score < 0.97 or not heard
+        heard = all(self._heard(tag, step.settled) for tag in tags)
+        return best.score < 0.97 or not heard or step.now - step.settled < _SEVERAL_S
+
+    def _heard(self, tag: str, since: float) -> bool:
+        """Whether the rounds have told if the tag has gone; one that is read may be in the hand at first."""
+        read, missed = self._presence.rounds(tag, since)
+        return (read == 0 and missed >= _HEARD) or any(self._presence.rounds(tag, since + _IN_HAND_S))
 
     def _may_be_an_arm(self, step: Step, best: Explanation) -> bool:
         """A new load without a tag, not yet steady for long or not as quiet as a thing: somebody may lean on it."""
@@ -248,7 +257,10 @@ class CabinetEstimator:
     def _apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         for thing in explanation.removed:
             at = thing.centre(self._geometry)
-            self._namer.left(thing, step.settled, at.weight_g, at.weight_sd_g)
+            # What was measured badly when it came is known better now.
+            badly = len(explanation.removed) == 1 and explanation.kind == "take" and not explanation.tight
+            weight_g = -step.weight_g if badly else at.weight_g
+            self._namer.left(thing, step.settled, weight_g, at.weight_sd_g)
         self._balance.removed(explanation.removed, step.now, tight=explanation.tight)
         self._rested = step.settled
         self._book.newest = []
@@ -261,7 +273,13 @@ class CabinetEstimator:
         settling = self._book.settling
 
         def taken(thing: Thing) -> float:
-            return 0.0 if thing.tag is None else self._presence.taken(thing.tag, step.settled)
+            if thing.tag is None:
+                return 0.0
+            later = step.settled + _IN_HAND_S
+            soon = self._presence.taken(thing.tag, step.settled)
+            if sum(self._presence.rounds(thing.tag, later)) == 0:
+                return soon
+            return min(soon, self._presence.taken(thing.tag, later, 0.02))
 
         if settling is None:
             return Evidence(taken, self._namer.loose(), doubts=self._book.doubts)

@@ -52,7 +52,7 @@ _LOOSE = 0.01
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
 _HAND_M, _CROWDED_M = 0.015, 0.03
 #: Two things put at once stand so far apart at least; nearer, it was one that was tilted (log-odds of the price).
-_ONE_M, _TWO_M, _TILTED = 0.05, 0.075, -8.0
+_ONE_M, _TWO_M, _TILTED = 0.06, 0.085, -8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +130,13 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         prior = math.log(_PRIOR["take"]) + each + tag
         both_ways = float(np.logaddexp(tight, loose))
         found.append(Explanation("take", prior + both_ways, removed=(thing,), tight=tight > loose))
+        newest = evidence.settling
+        if settings.knows_places and newest is not None and newest is not thing and evidence.settling_share > 0.01:
+            # It was on its way while the other one was put, which was measured with a part of it.
+            prior = math.log(_PRIOR["take"] * _PRIOR["adjust"] * evidence.settling_share) + each + tag
+            whole = left + newest.load
+            score = prior + put(whole, both + newest.variance)
+            found.append(Explanation("adjust", score, removed=(thing,), thing=newest, load=whole))
         after = put(left, both)
         if after > -math.inf:
             prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
