@@ -11,6 +11,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
 from tms_schemas.problem import Problem, ProblemItem
@@ -43,6 +44,11 @@ def install(app: FastAPI) -> None:
             title=HTTPStatus(error.status_code).phrase, status=error.status_code, detail=str(error.detail)
         )
         return _answer(problem, dict(error.headers or {}))
+
+    @app.exception_handler(ClientDisconnect)
+    async def gone(_: Request, __: ClientDisconnect) -> Response:
+        """In the middle of a body: nobody reads the answer, and it is no fault of the server."""
+        return response(BadRequest("the body ended before its end"))
 
     @app.exception_handler(Exception)
     async def unexpected(request: Request, error: Exception) -> Response:

@@ -8,6 +8,7 @@ from typing import Any
 
 import httpx
 import pytest
+from fastapi import FastAPI
 
 MOVE = {"seq": 7, "observed_at": "2026-05-01T10:00:00Z", "type": "label_moved", "label": "cab/1", "xy": [1, 2]}
 
@@ -117,3 +118,26 @@ async def test_text_that_databases_dislike_is_kept_as_it_is(http: httpx.AsyncCli
     odd = {**MOVE, "surface": "棚/上段 \x00 '; drop table log; --"}
     assert (await post(odd)).json()["accepted"] == 1
     assert (await post(odd)).json()["duplicates"] == 1
+
+
+async def test_who_goes_away_in_the_middle_of_a_body_is_no_fault_of_the_server(
+    app: FastAPI, http: httpx.AsyncClient, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun = {"type": "http.request", "body": b'{"agent": "cab"', "more_body": True}
+    arriving = iter([begun, {"type": "http.disconnect"}])
+    said: list[dict[str, Any]] = []
+
+    async def receive() -> dict[str, Any]:
+        return next(arriving)
+
+    async def send(message: dict[str, Any]) -> None:
+        said.append(message)
+
+    scope = {
+        "type": "http", "http_version": "1.1", "method": "POST", "scheme": "http", "path": "/v1/observations",
+        "raw_path": b"/v1/observations", "query_string": b"", "root_path": "", "headers": [(b"host", b"127.0.0.1")],
+        "client": ("127.0.0.1", 50000), "server": ("127.0.0.1", 80),
+    }  # fmt: skip
+    await app.with_state(scope, receive, send)  # type: ignore[attr-defined]
+    assert said[0]["status"] == 400 and caplog.records == []
+    assert (await http.get("/readyz")).status_code == 200
