@@ -96,10 +96,11 @@ class Stream:
     async def close(self) -> None:
         self.close_all()
         await asyncio.sleep(0)  # transports close in the next turn of the loop
-        if self.transport.get_write_buffer_size():  # a last word that nobody takes must not keep a dead line open
-            await asyncio.sleep(_LAST_WORD_S)
-            self.transport.abort()
-            await asyncio.sleep(0)
+        with contextlib.suppress(NotImplementedError):  # a stream that only listens
+            if self.transport.get_write_buffer_size():  # a last word that nobody takes must not keep a dead line open
+                await asyncio.sleep(_LAST_WORD_S)
+                self.transport.abort()
+                await asyncio.sleep(0)
 
 
 Opener = Callable[[], Awaitable[Stream]]
