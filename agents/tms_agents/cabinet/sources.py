@@ -64,7 +64,7 @@ class RosTmsBoard(_Line):
     kind: Literal["ros-tms"]
     cells: Annotated[int, Field(ge=1, le=36)] = 4
     period_s: Annotated[float, Field(ge=0.005, le=10)] = 0.02
-    #: ``one`` cell after the other, safe with any firmware; or ``all`` at once, which costs far less processor time.
+    #: ``one`` cell after the other, safe with any firmware; or ``all`` at once, which costs less processor time.
     ask: Literal["one", "all"] = "one"
 
     @property

@@ -11,7 +11,7 @@ from tms_server.log.record import Record
 
 #: (observed_at, agent, seq): a plain tuple, which costs a fraction of a ``Position`` and compares the same.
 _Place = tuple[int, str, int]
-#: Records kept as objects; what waits behind them is kept as text, which takes a tenth of the memory.
+#: Records kept as objects; what waits behind them is kept as text, which takes far less memory.
 _AT_HAND = 10_000
 
 

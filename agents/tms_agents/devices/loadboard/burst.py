@@ -1,4 +1,4 @@
-"""The board asked for all cells at once: an eighth of the cost, for firmware that queues what it is asked.
+"""The board asked for all cells at once: fewer turns of the event loop, for firmware that queues what it is asked.
 
 Answers come in the order of the questions, so a round counts only where exactly as many whole lines came as were asked
 for, and nothing else until the next round. Anything else spoils the round, and nothing is asked until the line was
