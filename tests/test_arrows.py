@@ -26,7 +26,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "tms_server/commands": {"tms_schemas", "tms_server", "tms_client", "pydantic", "sqlalchemy", "uvicorn"},
     "tms_server/placement": {"tms_schemas", "tms_server/placement", "numpy", "numba", "pydantic"},
-    "tms_migrations": {"tms_server", "alembic", "sqlalchemy"},
+    "tms_migrations": {"tms_server", "alembic", "sqlalchemy", "pydantic"},
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 from alembic import op
+from pydantic import AwareDatetime, TypeAdapter
 
 revision = "0002"
 down_revision = "0001"
@@ -16,6 +17,7 @@ branch_labels = None
 depends_on = None
 
 _TEXT = sa.Text().with_variant(sa.Text(collation="C"), "postgresql")
+_TIME: TypeAdapter[datetime] = TypeAdapter(AwareDatetime)
 #: Blocks read at a time.
 _PAGE = 500
 
@@ -122,6 +124,7 @@ def _opened(block: Mapping[str, Any]) -> Iterable[dict[str, Any]]:
         yield common | about | {"offset": first_offset + i, "body": json.dumps(item, ensure_ascii=False)}
 
 
-def _microseconds(time: str) -> int:
-    since = datetime.fromisoformat(time) - datetime(1970, 1, 1, tzinfo=UTC)
+def _microseconds(time: str | float) -> int:
+    """Of any form of time that the wire accepts."""
+    since = _TIME.validate_python(time) - datetime(1970, 1, 1, tzinfo=UTC)
     return since // timedelta(microseconds=1)

@@ -128,11 +128,26 @@ async def test_a_log_of_rows_becomes_a_log_of_blocks(engine: AsyncEngine) -> Non
     async with engine.connect() as connection:
         assert await connection.scalar(text("select newest_at from rooms")) == 5
 
+    # A block of two, one with a time in another form that the wire accepts.
+    left = '{"seq":%d,"observed_at":%s,"type":"mover_left","label":"floor/1"}'
+    body = '{{"agent":"floor","room":"lab","observations":[{},{}]}}'.format(
+        left % (8, "6"),
+        left % (9, '"1970-01-01T00:00:07Z"'),
+    )
+    async with engine.execution_options(**{WRITE: True}).begin() as connection:
+        block = f"('lab', 4, 'floor', 8, 2, 6000000, 7000000, 9, false, '{body}')"
+        await connection.exec_driver_sql(f"insert into log values {block}")
+    everything = await read()
+    assert [record.seq for record in everything] == [1, 7, 8, 9]
+
     await within(engine, downgrade("0001"))
     async with engine.connect() as connection:
-        rows = (
-            await connection.execute(text('select "offset", agent, seq, observed_at, kind from log order by 1'))
-        ).all()
-    assert [tuple(row) for row in rows] == [(1, "@lab", 1, 0, "registry"), (2, "floor", 7, 5, "mover_left")]
+        found = await connection.execute(text('select "offset", agent, seq, observed_at, kind from log order by 1'))
+    assert [tuple(row) for row in found.all()] == [
+        (1, "@lab", 1, 0, "registry"),
+        (2, "floor", 7, 5, "mover_left"),
+        (3, "floor", 8, 6_000_000, "mover_left"),
+        (4, "floor", 9, 7_000_000, "mover_left"),
+    ]
     await migrate(engine)
-    assert await read() == [first, second]
+    assert await read() == everything
