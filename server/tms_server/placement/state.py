@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tms_server.placement import kernels, thinning
+from tms_server.placement import kernels, settling, thinning
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -78,7 +78,7 @@ class Hypotheses:
         Returns (total mass, objects that were in play or moved). A total of 0 leaves everything as it is.
         """
         rows = self.rows if rows is None else rows
-        total, w, zob, new, cols, touched = kernels.settle(rows, self.cols, self.col_of, self.pinned, *children, merge)
+        total, w, zob, new, cols, touched = settling.settle(rows, self.cols, self.col_of, self.pinned, *children, merge)
         if not total > 0.0:
             return 0.0, touched
         self.rows, self.cols, self.w, self.zob = new, cols, w, zob
@@ -95,7 +95,7 @@ class Hypotheses:
             thinning.calibrate(rows, w, target, _SWEEPS)
         still = np.full(keep.size, -1, np.int32)
         self.w, self.zob = w, self.zob[keep]
-        self.rows, self.cols, _ = kernels.build(
+        self.rows, self.cols, _ = settling.build(
             rows, self.cols, self.col_of, self.pinned, np.arange(keep.size, dtype=np.int32), still, still
         )
 
