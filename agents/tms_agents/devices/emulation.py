@@ -12,6 +12,7 @@ import os
 import pty
 import tempfile
 import tty
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -29,13 +30,13 @@ class StreamingDevice(EmulatedDevice, Protocol):
         """What the device sends by itself now; called every ``tick_s`` of its line."""
 
 
-class _Line:
+class _Line(ABC):
     def __init__(self, device: EmulatedDevice, tick_s: float | None) -> None:
         self.device, self._tick_s = device, tick_s
 
+    @abstractmethod
     def inject(self, data: bytes) -> None:
         """Send bytes as they are: garbage, half a frame, what a device sends by itself."""
-        raise NotImplementedError
 
     async def __aenter__(self) -> None:
         self._ticking = asyncio.create_task(self._tick())

@@ -88,7 +88,7 @@ class Stream:
             return b""
 
     def write(self, data: bytes) -> None:
-        if self.transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
+        if self.unsent() > _MAX_UNSENT_BYTES:
             raise DeviceFault("the device takes no commands")
         if data:
             self.transport.write(data)
@@ -96,11 +96,14 @@ class Stream:
     async def close(self) -> None:
         self.close_all()
         await asyncio.sleep(0)  # transports close in the next turn of the loop
-        with contextlib.suppress(NotImplementedError):  # a stream that only listens
-            if self.transport.get_write_buffer_size():  # a last word that nobody takes must not keep a dead line open
-                await asyncio.sleep(_LAST_WORD_S)
-                self.transport.abort()
-                await asyncio.sleep(0)
+        if self.unsent():  # a last word that nobody takes must not keep a dead line open
+            await asyncio.sleep(_LAST_WORD_S)
+            self.transport.abort()
+            await asyncio.sleep(0)
+
+    def unsent(self) -> int:
+        """Bytes that the line has not taken yet."""
+        return self.transport.get_write_buffer_size()
 
 
 Opener = Callable[[], Awaitable[Stream]]

@@ -93,6 +93,9 @@ class _Listening(Stream):
     def write(self, data: bytes) -> None:
         assert not data
 
+    def unsent(self) -> int:
+        return 0
+
 
 async def _stdin() -> Stream:
     """Standard input, which must be a pipe or a terminal."""
