@@ -74,7 +74,7 @@ def test_the_experiment_is_seen_as_it_happens(server: ServerProcess, watched: Wa
         expect(page.locator('[data-kind="robot"] circle.mark')).to_have_attribute("r", "8")
         expect(mover(page, "robot")).to_have_attribute("data-count", "1")
         half = {"#ffffff": pytest.approx(0.5, abs=0.02), orange: pytest.approx(0.5, abs=0.02)}
-        assert slices(page, 3) == slices(page, 4) == half
+        assert [slices(page, number) for number in (3, 4)] == [half] * 2
         expect(card(page, 2)).to_contain_text("robot's hand")
 
         told.play(STEPS[4])
@@ -100,12 +100,12 @@ def test_where_is_it_in_words_and_by_keyboard(server: ServerProcess, watched: Wa
         page.keyboard.press("Enter")
         answer = page.locator("#answer-text")
         expect(answer).to_contain_text(re.compile(r"Tea bottle is probably .*on the floor \(\d\d %\)"))
-        expect(answer).to_contain_text(re.compile(r"with the person \(5[01] %\)"))
+        expect(answer).to_contain_text(re.compile(r"with the person \((?:49|5[0-2]) %\)"))
         expect(card(page, 3)).to_be_focused()
         expect(page.locator("#plan")).to_have_class(re.compile("pointing"))
         expect(page.locator('[data-kind="floor"]')).to_have_class(re.compile("pointed"))
         expect(page.locator('[data-kind="cabinet"]').first).not_to_have_class(re.compile("pointed"))
-        expect(card(page, 3)).to_have_accessible_name(re.compile(r"^Tea bottle: .*with the person 5[01] %"))
+        expect(card(page, 3)).to_have_accessible_name(re.compile(r"^Tea bottle: .*with the person (?:49|5[0-2]) %"))
         page.keyboard.press("Tab")
         expect(card(page, 4)).to_be_focused()
         page.get_by_label("Where is").fill("unicorn")
