@@ -17,6 +17,7 @@ from tms_agents.cabinet.live import serve_view, socket_path
 from tms_agents.cabinet.state import load_state, save_state, state_path
 from tms_agents.cabinet.view import view_of
 from tms_agents.cabinet.weights import Weights, weights_path
+from tms_agents.devices.beat import sleep_to_the_beat
 from tms_agents.devices.transport import DeviceState
 from tms_agents.running import Posted, Running, running
 from tms_client.cli import CommandError
@@ -113,7 +114,7 @@ class _Work:
 
     async def _look_after(self) -> None:
         while True:
-            await asyncio.sleep(_TICK_S)
+            await sleep_to_the_beat(_TICK_S)
             await self._tell_states()
             if self._inventory_at is not None and self._clocks.now() >= self._inventory_at:
                 self._inventory_at = None
