@@ -84,7 +84,7 @@ class Conversation(Generic[T]):
         self._running = True
         if not self._polled:
             self._loop.add_reader(self._stream.fd, self._turn)
-        self._schedule(self._wait_s())
+        self._schedule(self._loop.time(), self._wait_s())
 
     def _pause(self) -> None:
         if self._running and not self._polled:
@@ -95,10 +95,11 @@ class Conversation(Generic[T]):
             self._timer = None
 
     def _turn(self) -> None:
+        now = self._loop.time()
         try:
-            self._look()
+            self._look(now)
             if (wait_s := self._wait_s()) <= 0 and not self._over:
-                self._look()
+                self._look(now)
                 wait_s = self._wait_s()
         except Exception as error:  # raised to the listener, whatever it is
             self._error = error
@@ -107,15 +108,15 @@ class Conversation(Generic[T]):
             self._pause()
             self._wake()
             return
-        self._schedule(wait_s)
-        if self._heard and (self._urgent or self._loop.time() - self._told_at >= self._gather_s()):
+        self._schedule(now, wait_s)
+        if self._heard and (self._urgent or now - self._told_at >= self._gather_s() - _SHORTEST_TICK_S):
             self._wake()
 
     def _wake(self) -> None:
         if self._listener is not None and not self._listener.done():
             self._listener.set_result(None)
 
-    def _look(self) -> None:
+    def _look(self, now: float) -> None:
         session = self._session
         data = self._stream.read()
         if data == b"":
@@ -123,11 +124,11 @@ class Conversation(Generic[T]):
             return
         items = session.receive(data) if data else ()
         if session.frames > self._frames:
-            self._alive_at, self._frames = self._loop.time(), session.frames
+            self._alive_at, self._frames = now, session.frames
             if session.ready and not self._well:
                 self._well = True
                 self._tell(self._alive())
-        elif states := self._silence(self._loop.time() - self._alive_at):
+        elif states := self._silence(now - self._alive_at):
             self._well = False
             self._tell(states)
         if items:
@@ -143,9 +144,9 @@ class Conversation(Generic[T]):
     def _wait_s(self) -> float:
         return self._tick_s if self._paced is None else min(self._tick_s, self._paced.tick_s)
 
-    def _schedule(self, wait_s: float) -> None:
+    def _schedule(self, now: float, wait_s: float) -> None:
         """A timer that rings too early is left alone: it costs less than a new one at every byte."""
-        self._due = on_the_beat(self._loop.time() + max(wait_s, _SHORTEST_TICK_S), wait_s)
+        self._due = on_the_beat(now + max(wait_s, _SHORTEST_TICK_S), wait_s)
         if self._timer is None or self._timer.when() > self._due:
             if self._timer is not None:
                 self._timer.cancel()
