@@ -19,7 +19,7 @@ from tms_agents.devices.streams import Stream
 T = TypeVar("T")
 
 _SHORTEST_TICK_S = 0.001
-#: Groups of readings that nobody took: beyond this the device is not read any more.
+#: Readings that nobody took: beyond this the device is not read any more.
 _MOST_WAITING = 1000
 
 
@@ -45,7 +45,7 @@ class Conversation(Generic[T]):
         self._paced = session if isinstance(session, Paced) else None
         self._polled = isinstance(session, Polled)
         self._heard: list[Sequence[T] | DeviceState] = []
-        self._told_at = 0.0
+        self._told_at, self._waiting = 0.0, 0
         self._well = self._urgent = False
         self._listener: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
@@ -62,13 +62,16 @@ class Conversation(Generic[T]):
     async def heard(self) -> list[Sequence[T] | DeviceState]:
         """What came since the last call, at least one thing; nothing at the end of the stream.
 
+        Readings between two states are one group.
+
         Raises:
             DeviceFault, OSError: that ended it, after everything that came before.
         """
         if not self._heard and not self._over:
             self._listener = self._loop.create_future()
             await self._listener
-        heard, self._heard, self._urgent, self._told_at = self._heard, [], False, self._loop.time()
+        heard, self._heard, self._urgent, self._waiting = self._heard, [], False, 0
+        self._told_at = self._loop.time()
         if not heard and self._error is not None:
             raise self._error
         if not self._running and not self._over:
@@ -104,7 +107,7 @@ class Conversation(Generic[T]):
         except Exception as error:  # raised to the listener, whatever it is
             self._error = error
             self.end()
-        if self._over or len(self._heard) >= _MOST_WAITING:
+        if self._over or self._waiting >= _MOST_WAITING:
             self._pause()
             self._wake()
             return
@@ -132,7 +135,12 @@ class Conversation(Generic[T]):
             self._well = False
             self._tell(states)
         if items:
-            self._heard.append(items)
+            self._waiting += len(items)
+            last = self._heard[-1] if self._heard else None
+            if isinstance(last, list):  # one group, so that the listener can tell how they lie in time
+                last += items
+            else:
+                self._heard.append(list(items))
         session.tick()
         if output := session.output():
             self._stream.write(output)
