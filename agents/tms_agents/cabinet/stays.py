@@ -30,9 +30,23 @@ class Thing:
     joint: frozenset[int] = frozenset()
     #: Position last told.
     told: tuple[float, float] = (0.0, 0.0)
+    #: Variance of the place along x and y relative to what follows from ``variance``: the way on which the load came
+    #: tells more about the place, and about what its weight does not tell.
+    sharper: tuple[float, float] = (1.0, 1.0)
 
     def centre(self, geometry: Geometry) -> Centre:
-        return centre(self.load, self.variance, geometry, None if self.joint else self.known)
+        at = centre(self.load, self.variance, geometry, None if self.joint else self.known)
+        (a, b), (xx, xy, yy) = self.sharper, at.cov
+        return at._replace(cov=(a * xx, math.sqrt(a * b) * xy, b * yy))
+
+    def place(self, xy: Array, variance: Array, geometry: Geometry) -> None:
+        """The load, whose sum stays, is known to be at ``xy`` (2,) with errors of ``variance`` (2,) m^2."""
+        total = float(self.load.sum())
+        missing = np.array([0.0, *(total * xy - geometry.moments[1:] @ self.load)])
+        # The least change of the cells that does it.
+        self.load = self.load + np.linalg.pinv(geometry.moments) @ missing
+        cov = centre(self.load, self.variance, geometry).cov
+        self.sharper = (float(variance[0]) / max(cov[0], 1e-12), float(variance[1]) / max(cov[2], 1e-12))
 
     def at(self, now: float, creep_per_hour: float) -> Array:
         """Variance of the load it would take away ``now``: creep has changed it since."""
@@ -84,6 +98,7 @@ class Shelf:
                     "known": None if thing.known is None else [thing.known.mean_g, thing.known.sd_g],
                     "joint": sorted(thing.joint),
                     "told": list(thing.told),
+                    "sharper": list(thing.sharper),
                 }
                 for thing in self.things.values()
             ],
@@ -106,5 +121,6 @@ class Shelf:
                 known=None if item["known"] is None else KnownWeight(*item["known"]),
                 joint=frozenset(item["joint"]),
                 told=(float(item["told"][0]), float(item["told"][1])),
+                sharper=(float(item.get("sharper", (1, 1))[0]), float(item.get("sharper", (1, 1))[1])),
             )
         return shelf
