@@ -89,7 +89,9 @@ class Bookkeeper:
                 settling = Settling(
                     thing, step.before - thing.load, step.before_variance + thing.variance, step.now, new=False
                 )
-            thing.load, thing.sharper = explanation.load, (1.0, 1.0)
+            thing.load = explanation.load
+            thing.forget_place()
+            settling.way = settling.placed = None  # that way led to a load that a hand pressed
             thing.variance = step.variance - step.before_variance + settling.variance
             self.settling = Settling(thing, settling.before, settling.variance, step.now, new=settling.new)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
@@ -106,6 +108,8 @@ class Bookkeeper:
         self.doubts.remove(doubt)
         doubt.thing.load = doubt.thing.load - doubt.change
         doubt.other.load = doubt.other.load + doubt.change
+        for thing in (doubt.thing, doubt.other):
+            thing.forget_place()
         stays = [thing for thing in (doubt.thing, doubt.other) if thing not in gone]
         return [event for thing in stays for event in self._tell(thing, now, always=True)]
 
@@ -136,6 +140,7 @@ class Bookkeeper:
             rest = (step.change + thing.load) / len(partners)
             for partner in partners:
                 partner.load = partner.load + rest
+                partner.forget_place()
                 partner.joint = partner.joint - {thing.id}
                 if len(partners) == 1:
                     partner.variance, partner.joint = step.variance * 2, frozenset()
