@@ -137,9 +137,11 @@ class Pairing:
     def failed(self, tag: str) -> None:
         """The pair was not registered: start over with this thing, tag and scan.
 
-        Its tag does not wait for the next scan, which may well be that of the next thing.
+        Its tag does not wait for the next scan, which may well be that of the next thing; nor does another one, while
+        this thing is at the reader.
         """
-        self._done.pop(tag, None)
+        if self._done.pop(tag, "") is None and tag in self._seen:
+            self._forget_other(tag)
 
     def _look(self, t: float) -> list[Outcome]:
         """What is at the reader now."""

@@ -163,7 +163,7 @@ class Watch:
     def __init__(self) -> None:
         self.scan: tuple[str, float] | None = None  # the last good scan, not used yet
         self.known: set[str] = set()  # registered, or on the way
-        self.seen: list[tuple[float, str]] = []
+        self.seen: list[tuple[float, str, bool]] = []  # when, which, and whether it was known then
 
     def check(self, t: float, outcomes: list) -> None:
         for outcome in outcomes:
@@ -174,9 +174,9 @@ class Watch:
             assert self.scan is not None and outcome.code == self.scan[0], "a scan is used once, and only the last one"
             assert t - self.scan[1] <= EXPIRES, "never a stale scan"
             assert outcome.tag not in self.known, "never registers twice"
-            last = max(when for when, tag in self.seen if tag == outcome.tag)
+            last = max(when for when, tag, _ in self.seen if tag == outcome.tag)
             assert t - last <= EXPIRES, "never a stale tag"
-            since = {tag for when, tag in self.seen if when > last} - {outcome.tag} - self.known
+            since = {tag for when, tag, known in self.seen if when > last and not known} - {outcome.tag} - self.known
             assert not since, "no other thing was at the reader since"
             self.scan = None
             self.known.add(outcome.tag)
@@ -190,7 +190,7 @@ def test_laws(steps):
         t += pause
         watch.check(t, one.tick(t))
         if what in ("read", "typed"):
-            watch.seen.append((t, value))
+            watch.seen.append((t, value, value in watch.known))
         match what:
             case "scan":
                 watch.scan = (value, t)
