@@ -139,13 +139,13 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             found.append(Explanation("adjust", score, removed=(thing,), thing=newest, load=whole))
         after = put(left, both)
         if after > -math.inf:
-            prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
+            prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load, geometry)
             # A thing half lifted or tilted looks like a lighter one in its place.
             crowd = crowded(left)
             found.append(Explanation("swap", prior + after + crowd, removed=(thing,), load=left))
             if settings.knows_places and abs(step.weight_g) < 0.5 * float(thing.load.sum()):
                 prior = math.log(_PRIOR["slide"]) + each - max(tag, 0.0)
-                prior += max(path_odds(step, -thing.load, same_thing=True), 0.0)
+                prior += max(path_odds(step, -thing.load, geometry, same_thing=True), 0.0)
                 still, pressed = put.slid(change, left, both)
                 found.append(Explanation("slide", prior + still, thing=thing, load=left))
                 found.append(Explanation("press", prior + math.log(_PRESSED_SLIDE) + pressed, thing=thing))
@@ -165,7 +165,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             score = math.log(_PRIOR["take"]) + each + evidence.taken(which) + doubt.odds
             score += normal(change + which.load + sign * doubt.change, noise)
             found.append(Explanation("take", score, removed=(which,), undo=doubt))
-    found += _two_taken(step, things, noises, taken)
+    found += _two_taken(step, things, noises, taken, geometry)
     if step.weight_g > 2 * settings.min_weight_g:
         found += _two_put(step, put, evidence.loose)
     return _normalised(found)
@@ -198,12 +198,14 @@ def _taken_and_pressed(
         for thing in things:
             if thing not in swap.removed:
                 prior = math.log(_PRIOR["take"] * _PRIOR["press"]) - 2 * math.log(len(things))
-                prior += path_odds(step, step.change - swap.load)
+                prior += path_odds(step, step.change - swap.load, put.geometry)
                 pressed.append(Explanation("press", prior + put.same_place(thing, left, _HAND_M), thing=thing))
     return pressed
 
 
-def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list[float]) -> list[Explanation]:
+def _two_taken(
+    step: Step, things: list[Thing], noises: list[Array], taken: list[float], geometry: Geometry
+) -> list[Explanation]:
     if len(things) < 2 or step.weight_g > 0:
         return []
     loads, spreads, tags = np.array([t.load for t in things]), np.array(noises), np.array(taken)
@@ -214,7 +216,7 @@ def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list
     scores += math.log(_TWO_TAKEN / len(first))
     best = np.argsort(scores)[::-1][:8]
     for i in best:
-        scores[i] += path_odds(step, -loads[first[i]])
+        scores[i] += path_odds(step, -loads[first[i]], geometry)
     return [Explanation("take", float(scores[i]), removed=(things[first[i]], things[second[i]])) for i in best]
 
 
@@ -222,7 +224,7 @@ def _two_put(step: Step, put: PutDensity, loose: Mapping[str, KnownWeight | None
     """Two things at once: told apart by the path of the load, or only known as a sum of two known weights."""
     prior = math.log(_TWO_PUT_TAGS if len(loose) >= 2 else _TWO_PUT)
     found = []
-    parts = split(step)
+    parts = split(step, put.geometry)
     if parts is not None:
         volume = 0.5 * float(np.log(2 * math.pi * parts.variance).sum())
         score = (

@@ -110,6 +110,9 @@ class Namer:
         """A thing was lifted: remember what it weighed."""
         if thing.tag is not None:
             self._lifted[thing.tag] = now
+            known = self.known.get(thing.tag)
+            if known is not None and abs(weight_g - known.mean_g) > 4 * math.hypot(sd_g, known.sd_g) + 2.0 and thing.known:
+                return  # it was known to fit when it came, so that it was measured badly
             self.learned.pop(thing.tag, None)
             self.learned[thing.tag] = KnownWeight(weight_g, sd_g + 0.005 * abs(weight_g))
             while len(self.learned) > _LEARNED_KEPT:
