@@ -27,6 +27,7 @@ class Detection:
     at: float
     stay: str
     xy: Xy | None = None
+    cov: tuple[float, float, float] | None = None  # what it says of its own error: var_x, cov_xy, var_y
     tag: str | None = None
     group: tuple[str, ...] = ()  # "unpinned": stays that share one load in unknown parts
 
@@ -93,7 +94,7 @@ def _detections(at: float, events: list[CabinetEvent]) -> list[Detection]:
     for event in events:
         match event:
             case Appeared():
-                said.append(Detection(kind="in", at=at, stay=str(event.stay), xy=event.xy))
+                said.append(Detection(kind="in", at=at, stay=str(event.stay), xy=event.xy, cov=event.cov))
             case Vanished():
                 said.append(Detection(kind="out", at=at, stay=str(event.stay)))
             case Moved():

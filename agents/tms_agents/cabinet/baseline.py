@@ -29,11 +29,12 @@ class Level:
         """Take one block of the resting load."""
         duration = block.end - block.start
         keep = max(0.0, 1.0 - duration / self._memory_s)
-        weight = 1.0 / float(block.variance.mean())
+        mean, variance = block.sharp or (block.mean, block.variance)
+        weight = 1.0 / float(variance.mean())
         self.weight = keep * self.weight + weight
         share = weight / self.weight
-        self.mean = self.mean + share * (block.mean - self.mean)
-        self.variance = (1 - share) ** 2 * self.variance + share**2 * block.variance
+        self.mean = self.mean + share * (mean - self.mean)
+        self.variance = (1 - share) ** 2 * self.variance + share**2 * variance
         self.seconds = keep * self.seconds + duration
 
     def set(self, mean: Array, variance: Array) -> None:

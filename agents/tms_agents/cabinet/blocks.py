@@ -29,6 +29,11 @@ class Block:
     n: int
     mean: Array
     variance: Array
+    #: The samples themselves (n, k), and the usual variance (k,) of one.
+    samples: Array
+    unit: Array
+    #: Mean and variance with every sample weighted by how quiet its moment was, once that is known.
+    sharp: tuple[Array, Array] | None = None
 
 
 class Blocks:
@@ -60,7 +65,8 @@ class Blocks:
         if t - self._start + 1.5 * period < self._settings.block_s and t >= self._start:
             return None
         samples = np.array([*self._before, *self._samples])
-        block = Block(self._start, t, len(self._samples), np.mean(samples[-len(self._samples) :], axis=0), np.empty(0))
+        own = samples[-len(self._samples) :]
+        block = Block(self._start, t, len(own), np.mean(own, axis=0), np.empty(0), own, np.empty(0))
         self._before.extend(self._samples[-2:])
         self._samples.clear()
         return block, samples

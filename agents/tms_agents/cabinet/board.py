@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -68,11 +69,11 @@ class Board:
 
     def sample(self, t: float, sample: LoadSample) -> list[CabinetEvent]:
         """One sample at sensor time ``t``."""
-        values = np.array(sample.values, dtype=float)
-        if len(values) != len(self.grams):
-            self._failing(t, f"{len(values)} values for {len(self.grams)} cells")
+        count = len(sample.values)
+        if count != len(self.grams):
+            self._failing(t, f"{count} values for {len(self.grams)} cells")
             return []
-        raw = values if self.calibration is None else self.calibration.grams(sample.values)
+        raw = np.array(sample.values, float) if self.calibration is None else self.calibration.grams(sample.values)
         grams = self._continuity.take(t, raw)
         if grams is None:
             return []
@@ -128,7 +129,7 @@ class Board:
 
     def _unusable(self) -> list[int]:
         """Cells that deliver nothing or the same number for too long."""
-        bad = set(np.flatnonzero(~np.isfinite(self.grams)).tolist())
+        bad = {cell for cell, grams in enumerate(self.grams.tolist()) if not math.isfinite(grams)}
         if not self._filtered and self.section.cells is not None:
             bad |= set(self.estimator.unusable_cells)
         return sorted(bad)

@@ -17,6 +17,7 @@ import numpy as np
 from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
 from tms_agents.cabinet.fusion import Doubt, Explanation
 from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.placing import Placed, Way, place, refine
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step
@@ -33,6 +34,9 @@ class Settling:
     #: It came with this step: if nothing remains of it, it was nothing.
     new: bool = True
     looked: bool = False
+    #: How it came, where nothing else came with it, and what that told about its place.
+    way: Way | None = None
+    placed: Placed | None = None
 
 
 class Bookkeeper:
@@ -68,11 +72,13 @@ class Bookkeeper:
             assert explanation.load is not None
             variance = step.variance + gone_variance
             thing = self._shelf.put(explanation.load, variance, since=step.settled, onset=step.onset)
+            before_variance = step.before_variance + gone_variance
+            self.settling = Settling(thing, step.before - gone, before_variance, step.now)
+            if explanation.kind == "put":
+                self._place(self.settling, step)
             at = thing.centre(self._shelf.geometry)
             thing.told = at.xy
             events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
-            before_variance = step.before_variance + gone_variance
-            self.settling = Settling(thing, step.before - gone, before_variance, step.now)
             self.newest = [thing]
         elif explanation.kind in ("two", "joint"):
             events += self._put_two(step, explanation)
@@ -84,15 +90,26 @@ class Bookkeeper:
                     thing, step.before - thing.load, step.before_variance + thing.variance, step.now, new=False
                 )
             thing.load = explanation.load
+            thing.forget_place()
+            settling.way = settling.placed = None  # that way led to a load that a hand pressed
             thing.variance = step.variance - step.before_variance + settling.variance
             self.settling = Settling(thing, settling.before, settling.variance, step.now, new=settling.new)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events
 
+    def _place(self, settling: Settling, step: Step) -> None:
+        """Nothing else came with this step: all of it tells where the thing stands."""
+        placed = None if step.way is None else place(step.way, self._shelf.geometry)
+        if placed is not None:
+            settling.way, settling.placed = step.way, placed
+            settling.thing.place(np.array(placed.xy), np.array(placed.variance), self._shelf.geometry)
+
     def _undo(self, now: float, doubt: Doubt, gone: Sequence[Thing]) -> list[CabinetEvent]:
         self.doubts.remove(doubt)
         doubt.thing.load = doubt.thing.load - doubt.change
         doubt.other.load = doubt.other.load + doubt.change
+        for thing in (doubt.thing, doubt.other):
+            thing.forget_place()
         stays = [thing for thing in (doubt.thing, doubt.other) if thing not in gone]
         return [event for thing in stays for event in self._tell(thing, now, always=True)]
 
@@ -123,6 +140,7 @@ class Bookkeeper:
             rest = (step.change + thing.load) / len(partners)
             for partner in partners:
                 partner.load = partner.load + rest
+                partner.forget_place()
                 partner.joint = partner.joint - {thing.id}
                 if len(partners) == 1:
                     partner.variance, partner.joint = step.variance * 2, frozenset()
@@ -141,6 +159,9 @@ class Bookkeeper:
             return []
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
+        if settling.way is not None and settling.placed is not None:
+            at, spread = refine(settling.way, settling.placed.tail, thing.load, variance, self._shelf.geometry)
+            thing.place(at, spread, self._shelf.geometry)
         if settling.new and float(thing.load.sum()) < 0.75 * self._settings.min_weight_g:
             # It was nothing after all.
             self.settling = None

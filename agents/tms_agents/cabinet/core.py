@@ -26,6 +26,8 @@ from tms_schemas.observation import Inventory, Observation, RawRead
 
 log = logging.getLogger(__name__)
 _STORY = 100
+#: Samples of a board at rest are taken so many seconds at a time: five at once cost little more than one.
+_PATIENCE_S = 0.1
 
 
 class Reader:
@@ -102,6 +104,11 @@ class Cabinet:
             if events := self.boards[board].sample(t, sample):
                 found += self._observations(board, events)
         return found
+
+    def patience_s(self, board: str) -> float:
+        """How long the next samples may wait for others: not while anything changes or antennas take turns with it."""
+        turns = any(reader.turns is not None for reader in self.readers.values() if board in reader.boards)
+        return _PATIENCE_S if self.boards[board].estimator.resting and not turns else 0.0
 
     def reads(self, reader: str, items: Sequence[TagItem]) -> tuple[list[Observation], set[str]]:
         """What a reader said just now: observations, and the tags that it read."""

@@ -333,6 +333,8 @@ class CabinetEstimator:
         self._rested = step.settled
         self._book.newest = []
         events = self._book.apply(step, explanation)
+        if self._book.settling is not None and self._book.settling.placed is not None:
+            self._detector.forget_before(self._book.settling.placed.ended)
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
         return events + self._namer.update(step.now, resting=self._detector.resting)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 from collections.abc import Callable
 
 from tms_agents.cabinet.config import BoardSection, ReaderSection
 from tms_agents.cabinet.core import Cabinet
 from tms_agents.cabinet.sources import open_loads
-from tms_agents.devices.transport import DeviceState
+from tms_agents.devices.beat import sleep_to_the_beat
+from tms_agents.devices.transport import DeviceState, Link
 from tms_agents.readers import Seen, open_reader
 from tms_schemas.observation import Observation
 
@@ -32,6 +32,8 @@ async def listen_to_board(
                 changed(item)
             else:
                 found(cabinet.samples(board.name, item), set())
+                if isinstance(source, Link):
+                    source.gather_s = cabinet.patience_s(board.name)
 
 
 async def listen_to_reader(
@@ -49,5 +51,5 @@ async def listen_to_reader(
 
 async def tick(cabinet: Cabinet, found: Found = lambda observations, tags: None) -> None:
     while True:
-        await asyncio.sleep(_TICK_S)
+        await sleep_to_the_beat(_TICK_S)
         found(*cabinet.tick())

@@ -50,7 +50,7 @@ class Noise:
         if len(seconds):
             self._learn_white((seconds**2).mean(axis=0) / 6, block.end - block.start + 1e-3)
         if np.isnan(self.variance).any():
-            block.variance = np.full(len(block.mean), 100.0)
+            block.variance = block.unit = np.full(len(block.mean), 100.0)
             return
         white = self.variance * self.factor / block.n
         if len(self._means) == 2:
@@ -61,7 +61,8 @@ class Noise:
             share = min(block.end - block.start, 1.0) / self._settings.noise_memory_s
             self.excess = max(1.0, self.excess + share * (min(scatter, 4 * self.excess) - self.excess))
         self._means.append(block.mean)
-        block.variance = white * max(self.excess, self._shaking())
+        slow = max(self.excess, self._shaking())
+        block.variance, block.unit = white * slow, self.variance * slow
 
     def _shaking(self) -> float:
         """Scatter of block means just now relative to white noise, 1 while nothing shakes the board.

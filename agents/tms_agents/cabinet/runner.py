@@ -17,6 +17,7 @@ from tms_agents.cabinet.live import serve_view, socket_path
 from tms_agents.cabinet.state import load_state, save_state, state_path
 from tms_agents.cabinet.view import view_of
 from tms_agents.cabinet.weights import Weights, weights_path
+from tms_agents.devices.beat import sleep_to_the_beat
 from tms_agents.devices.transport import DeviceState
 from tms_agents.running import Posted, Running, running
 from tms_client.cli import CommandError
@@ -24,7 +25,9 @@ from tms_client.errors import SpoolError
 from tms_schemas.observation import Observation
 
 log = logging.getLogger(__name__)
-_TICK_S = 0.1
+_LOOK_S = 0.2
+#: Between two times that the state is saved.
+_SAVE_PAUSE_S = 0.1
 #: After a device came back, what changed meanwhile has been told by then.
 _SETTLED_S = 2.0
 _SAVE_S = 60.0
@@ -113,7 +116,7 @@ class _Work:
 
     async def _look_after(self) -> None:
         while True:
-            await asyncio.sleep(_TICK_S)
+            await sleep_to_the_beat(_LOOK_S)
             await self._tell_states()
             if self._inventory_at is not None and self._clocks.now() >= self._inventory_at:
                 self._inventory_at = None
@@ -146,7 +149,7 @@ class _Work:
             self._dirty.clear()
             state = self._cabinet.to_dict()
             await asyncio.to_thread(save_state, state_path(self._config.spool.path), self._config.agent, state)
-            await asyncio.sleep(_TICK_S)
+            await asyncio.sleep(_SAVE_PAUSE_S)
 
     def _save_now(self) -> None:
         save_state(state_path(self._config.spool.path), self._config.agent, self._cabinet.to_dict())

@@ -81,7 +81,6 @@ class RosTmsBoard(_Line):
             self.opener(115200),
             lambda: self._session()(cells=self.cells, period_s=self.period_s),
             silent_after_s,
-            self.period_s / 4,
         )
 
     def _session(self) -> type[RosTmsBoardSession] | type[RosTmsBoardBurst]:
@@ -116,7 +115,6 @@ class Scale(_Line):
             self.opener(dialect.baud, bits=bits, parity=parity),
             lambda: ScaleLineSession(name, mode=mode, poll_s=self.poll_s, software_parity=self.software_parity),
             silent_after_s,
-            min(0.05, self.poll_s / 2),
         )
 
 
@@ -193,6 +191,6 @@ def open_loads(sections: Sequence[RosTmsBoard | Scale | ModbusModule], silent_af
 
 
 def _link(
-    name: str, opener: Opener, session: Callable[[], Session[LoadSample]], silent_after_s: float, tick_s: float
+    name: str, opener: Opener, session: Callable[[], Session[LoadSample]], silent_after_s: float
 ) -> Link[LoadSample]:
-    return Link(opener, session, name=name, silent_after_s=silent_after_s, tick_s=tick_s)
+    return Link(opener, session, name=name, silent_after_s=silent_after_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,9 +31,27 @@ class Thing:
     joint: frozenset[int] = frozenset()
     #: Position last told.
     told: tuple[float, float] = (0.0, 0.0)
+    #: What the way on which the load came tells about the place: how far it is from where the load itself says, and its
+    #: variance along x and y relative to what follows from ``variance``.
+    aside: tuple[float, float] = (0.0, 0.0)
+    sharper: tuple[float, float] = (1.0, 1.0)
 
     def centre(self, geometry: Geometry) -> Centre:
-        return centre(self.load, self.variance, geometry, None if self.joint else self.known)
+        at = centre(self.load, self.variance, geometry, None if self.joint else self.known)
+        (a, b), (xx, xy, yy) = self.sharper, at.cov
+        x = min(max(at.xy[0] + self.aside[0], 0.0), geometry.width)
+        y = min(max(at.xy[1] + self.aside[1], 0.0), geometry.depth)
+        return at._replace(xy=(x, y), cov=(a * xx, math.sqrt(a * b) * xy, b * yy))
+
+    def place(self, xy: Array, variance: Array, geometry: Geometry) -> None:
+        """It is known to stand at ``xy`` (2,) with errors of ``variance`` (2,) m^2; its load stays what is measured."""
+        at = centre(self.load, self.variance, geometry)
+        self.aside = (float(xy[0]) - at.xy[0], float(xy[1]) - at.xy[1])
+        self.sharper = (float(variance[0]) / max(at.cov[0], 1e-12), float(variance[1]) / max(at.cov[2], 1e-12))
+
+    def forget_place(self) -> None:
+        """Another load: the way on which the old one came tells nothing about it."""
+        self.aside, self.sharper = (0.0, 0.0), (1.0, 1.0)
 
     def at(self, now: float, creep_per_hour: float) -> Array:
         """Variance of the load it would take away ``now``: creep has changed it since."""
@@ -84,6 +103,7 @@ class Shelf:
                     "known": None if thing.known is None else [thing.known.mean_g, thing.known.sd_g],
                     "joint": sorted(thing.joint),
                     "told": list(thing.told),
+                    "placed": [*thing.aside, *thing.sharper],
                 }
                 for thing in self.things.values()
             ],
@@ -106,5 +126,11 @@ class Shelf:
                 known=None if item["known"] is None else KnownWeight(*item["known"]),
                 joint=frozenset(item["joint"]),
                 told=(float(item["told"][0]), float(item["told"][1])),
+                aside=_pair(item.get("placed", (0, 0))[:2]),
+                sharper=_pair(item.get("placed", (0, 0, 1, 1))[2:]),
             )
         return shelf
+
+
+def _pair(values: Sequence[float]) -> tuple[float, float]:
+    return float(values[0]), float(values[1])

@@ -137,10 +137,9 @@ def _extended(blocks: Sequence[Block], length: int) -> list[Block]:
 
 def average(blocks: Sequence[Block]) -> tuple[Array, Array]:
     """Mean (k,) weighted by quietness, and its variance (k,)."""
-    variances = np.array([b.variance for b in blocks])
+    means, variances = (np.array(part) for part in zip(*(b.sharp or (b.mean, b.variance) for b in blocks), strict=True))
     weights = 1.0 / variances.mean(axis=1)
     weights /= weights.sum()
-    means = np.array([b.mean for b in blocks])
     mean = weights @ means
     # Slow vibration scatters more than the noise of the samples tells.
     freedom = (len(blocks) - 1) * len(mean)

@@ -17,12 +17,18 @@ import numpy as np
 from tms_agents.cabinet.baseline import Level
 from tms_agents.cabinet.blocks import Block
 from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.loudness import Loudness
+from tms_agents.cabinet.placing import Way
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.steady import average, chi_square_limit, restlessness, steady_tail
 
 _CHANGING_BLOCKS = 1000
+#: Blocks that a level needs to begin with.
+_LEAST_BLOCKS = 4
 #: Blocks remembered before a change.
 _HISTORY_BLOCKS = 75
+#: Loudness is judged for so many blocks at a time, knowing so many before and after them.
+_JUDGED, _CONTEXT = 6, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +51,8 @@ class Step:
     path_variance: Array
     #: Scatter of the steady blocks along the change, relative to noise.
     restless: float
+    #: All of it, block by block; None for what is no step of the load.
+    way: Way | None = None
 
     @property
     def weight_g(self) -> float:
@@ -59,6 +67,7 @@ class StepDetector:
         self.level = Level(cells, settings.level_memory_s)
         self._recent: deque[Block] = deque()
         self._history: deque[Block] = deque(maxlen=_HISTORY_BLOCKS)
+        self._loudness = Loudness()
         self._resting_blocks = 0
         self._changed: list[Block] | None = None
         self._offered: tuple[Step, list[Block]] | None = None
@@ -86,6 +95,12 @@ class StepDetector:
         for block in list(self._recent)[:-1]:
             level.add(block)
         return level.mean, level.variance, level.seconds
+
+    def forget_before(self, since: float) -> None:
+        """The load that rests now was still on its way before ``since``."""
+        blocks = [block for block in self._history if block.start >= since - 1e-9]
+        if self._changed is None and len(self._history) > len(blocks) >= _LEAST_BLOCKS:
+            self._start_resting(blocks)
 
     def interrupt(self) -> None:
         """Samples are missing from here on, and the newest ones are not to be believed: look at the level afresh."""
@@ -117,10 +132,11 @@ class StepDetector:
     def _rest(self, block: Block) -> None:
         self._recent.append(block)
         self._resting_blocks += 1
+        self._judge(self._recent)
         if self.level.known and self._departed():
             return
         lag = min(self._settings.level_lag_s / self._settings.block_s, self._resting_blocks / 2)
-        while len(self._recent) > max(lag, 1):
+        while len(self._recent) > max(lag, 1) and self._recent[0].sharp is not None:
             self.level.add(self._recent.popleft())
 
     def _departed(self) -> bool:
@@ -140,6 +156,19 @@ class StepDetector:
         self._changed, self._offered = blocks[-length:], None
         self._recent.clear()
         return True
+
+    def _judge(self, blocks: Sequence[Block], *, all_of_them: bool = False) -> None:
+        """Find how loud the newest of ``blocks`` were that this is not known of."""
+        known = next((i for i in range(len(blocks) - 1, -1, -1) if blocks[i].sharp is not None), -1)
+        if len(blocks) - 1 - known < (1 if all_of_them else _JUDGED + _CONTEXT):
+            return
+        # The newest ones are judged again when what follows them is known.
+        kept = [block.sharp for block in blocks]
+        first = max(known + 1 - (_JUDGED if all_of_them else 2 * _CONTEXT), 0)
+        self._loudness.sharpen(list(blocks)[first:])
+        if not all_of_them:
+            for block, sharp in zip(list(blocks)[: max(known + 1 - _CONTEXT, 0)], kept, strict=False):
+                block.sharp = sharp
 
     def _start_resting(self, blocks: Sequence[Block]) -> None:
         self.level = Level(self._cells, self._settings.level_memory_s)
@@ -163,6 +192,7 @@ class StepDetector:
         if self._offered is not None and steady[0].start >= self._offered[0].now:
             # The load went on from a plateau that was on offer: that one comes first, and finally.
             return self._offered[0]
+        self._judge(steady, all_of_them=True)
         mean, variance = average(steady)
         change, variance = mean - self.level.mean, variance + self.level.variance
         way = [block for block in blocks if block.start < steady[0].start]
@@ -177,6 +207,7 @@ class StepDetector:
             path=np.array([block.mean for block in way]).reshape(-1, self._cells) - self.level.mean,
             path_variance=np.array([block.variance for block in way]).reshape(-1, self._cells),
             restless=restlessness(steady, change),
+            way=self._way([*way, *steady], len(way)),
         )
         total = step.weight_g**2 / float(variance.sum())
         score = max(total, float((change**2 / variance).sum()) / self._whole_limit)
@@ -191,6 +222,20 @@ class StepDetector:
         elif seconds > settings.level_lag_s:
             self._start_resting(steady)  # too little to be a thing: the zero has moved
         return None
+
+    def _way(self, blocks: list[Block], tail: int) -> Way:
+        first = max(len(blocks) - _HISTORY_BLOCKS, 0)
+        blocks = blocks[first:]
+        means, variances = zip(*(block.sharp or (block.mean, block.variance) for block in blocks), strict=True)
+        return Way(
+            onset=blocks[0].start,
+            now=blocks[-1].end,
+            times=np.array([0.5 * (block.start + block.end) for block in blocks]),
+            means=np.array(means) - self.level.mean,
+            variances=np.array(variances),
+            tail=max(tail - first, 0),
+            before=self.level.variance,
+        )
 
     def is_final(self, step: Step) -> bool:
         """Whether the load has left the plateau of ``step`` already, so that it cannot be held any longer."""

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
 from tms_agents.devices.framing import FrameBuffer
-
-_LINE_END = re.compile(rb"[\r\n]+")
 
 
 class LineParser(FrameBuffer):
@@ -22,18 +18,21 @@ class LineParser(FrameBuffer):
         self._overlong = False
 
     def feed(self, data: bytes) -> list[bytes]:
-        *ended, rest = _LINE_END.split(data)
+        data = bytes(self._buffer) + data
+        self._buffer.clear()
+        ended = data.splitlines()
+        rest = ended.pop() if data and data[-1] not in b"\r\n" else b""
+        if self._overlong and ended:  # the end of the line that was dropped
+            self.skipped += len(ended.pop(0))
+            self._overlong = False
         lines = []
-        for part in ended:
-            line = bytes(self._buffer + part)
-            if self._overlong or len(line) > self._longest:
+        for line in ended:
+            if len(line) > self._longest:
                 self.skipped += len(line)
             elif line:
                 lines.append(line)
-            self._buffer.clear()
-            self._overlong = False
         self._buffer += rest
-        if self._overlong or len(self._buffer) > self._longest:
+        if self._overlong or len(rest) > self._longest:
             super().expire()
             self._overlong = True
         return lines

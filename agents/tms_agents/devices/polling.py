@@ -45,7 +45,7 @@ class PollingReader(Outgoing, ABC, Generic[Command, Reply]):
         super().__init__()
         self.frames = 0
         self.ready = False
-        self.tick_s = min(0.05, poll_s / 2)
+        self.tick_s = min(0.1, poll_s / 2)
         self.field = field or Field()
         self.field.is_off = False
         self._parser, self._poll_s, self._reply_s, self._clock = parser, poll_s, reply_s, clock

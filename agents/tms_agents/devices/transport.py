@@ -1,144 +1,38 @@
-"""Byte streams to devices and the link that keeps one alive: the only place of the drivers that does I/O.
+"""The link that keeps a device alive: with streams and conversations the only place of the drivers that does I/O.
 
 A driver is a ``Session``: it is told what arrived, returns readings, and collects what to send. ``Link`` opens the
-stream, feeds sessions, reconnects with backoff, and reports the device as connected, silent or faulty.
+stream, has a conversation, reconnects with backoff, and reports the device as connected, silent or faulty. Everything
+happens in the event loop; there are no threads.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
-from dataclasses import dataclass
-from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
+from collections.abc import AsyncGenerator, Callable, Sequence
+from typing import Generic, Literal, TypeVar
 
+from tms_agents.devices.conversation import Conversation
+from tms_agents.devices.sessions import DeviceFault, DeviceState, Paced, Polled, Session
+from tms_agents.devices.streams import Opener, Stream, serial, tcp
 from tms_client.flows import Retry
 
+__all__ = [
+    "DeviceFault",
+    "DeviceLink",
+    "DeviceState",
+    "Link",
+    "Opener",
+    "Paced",
+    "Polled",
+    "Session",
+    "Stream",
+    "serial",
+    "tcp",
+]
+
 T = TypeVar("T")
-T_co = TypeVar("T_co", covariant=True)
-
-#: Commands waiting to be taken by the device: beyond this it is stuck.
-_MAX_UNSENT_BYTES = 1 << 16
-_READ_BYTES = 1 << 16
-_SHORTEST_TICK_S = 0.001
-_LAST_WORD_S = 0.1
-
-
-class DeviceFault(Exception):
-    """The device refuses or answers nonsense; the text says why. The link starts anew."""
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceState:
-    state: Literal["connected", "silent", "faulty"]
-    why: str = ""
-
-
-class Session(Protocol[T_co]):
-    """The protocol of one connection, without I/O. Each method may raise ``DeviceFault``."""
-
-    #: Valid frames so far: the sign of life. ``ready``: the device is set up and delivers.
-    frames: int
-    ready: bool
-
-    def opened(self) -> None:
-        """The stream is open."""
-
-    def receive(self, data: bytes) -> Sequence[T_co]:
-        """Take bytes in pieces of any size; returns the readings they complete."""
-
-    def tick(self) -> None:
-        """Called several times a second, more often where the session is ``Paced``: poll, keep alive."""
-
-    def output(self) -> bytes:
-        """Bytes to send now; each is given out once."""
-
-    def closing(self) -> bytes:
-        """What to send before the stream is closed on our side."""
-
-
-@runtime_checkable
-class Paced(Protocol):
-    """A session that has to be ticked every ``tick_s`` seconds to keep its pace."""
-
-    tick_s: float
-
-
-@runtime_checkable
-class Polled(Paced, Protocol):
-    """A paced session whose input is looked at once per tick, not at every byte: far fewer turns of the event loop."""
-
-    polled: bool
-
-
-@dataclass(slots=True)
-class Stream:
-    """An open byte stream. ``read`` returns b"" at its end."""
-
-    reader: asyncio.StreamReader
-    transport: asyncio.WriteTransport
-    close_all: Callable[[], None]
-
-    async def read(self) -> bytes:
-        try:
-            return await self.reader.read(_READ_BYTES)
-        except OSError:  # a serial device that was pulled out
-            return b""
-
-    def write(self, data: bytes) -> None:
-        if self.unsent() > _MAX_UNSENT_BYTES:
-            raise DeviceFault("the device takes no commands")
-        if data:
-            self.transport.write(data)
-
-    async def close(self) -> None:
-        self.close_all()
-        await asyncio.sleep(0)  # transports close in the next turn of the loop
-        if self.unsent():  # a last word that nobody takes must not keep a dead line open
-            await asyncio.sleep(_LAST_WORD_S)
-            self.transport.abort()
-            await asyncio.sleep(0)
-
-    def unsent(self) -> int:
-        """Bytes that the line has not taken yet."""
-        return self.transport.get_write_buffer_size()
-
-
-Opener = Callable[[], Awaitable[Stream]]
-
-
-def tcp(host: str, port: int, timeout_s: float = 5.0) -> Opener:
-    async def open_() -> Stream:
-        async with asyncio.timeout(timeout_s):
-            reader, writer = await asyncio.open_connection(host, port)
-        return Stream(reader, writer.transport, writer.close)
-
-    return open_
-
-
-def serial(device: str, baud: int, *, parity: str = "N", bits: int = 8, stop_bits: int = 1) -> Opener:
-    """A serial line or a pseudo terminal, through pyserial (which sets it up) and asyncio (which waits for it)."""
-
-    async def open_() -> Stream:
-        from serial import Serial
-
-        # exclusive: two programs reading one line would each get half of it
-        port = Serial(device, baud, bytesize=bits, parity=parity, stopbits=stop_bits, timeout=0, exclusive=True)
-        port.reset_input_buffer()
-        loop = asyncio.get_running_loop()
-        reader = asyncio.StreamReader()
-        source, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), port)
-        sink, _ = await loop.connect_write_pipe(asyncio.BaseProtocol, os.fdopen(os.dup(port.fileno()), "wb", 0))
-
-        def close() -> None:
-            source.close()
-            sink.close()
-
-        return Stream(reader, sink, close)
-
-    return open_
 
 
 class DeviceLink(ABC, Generic[T]):
@@ -196,8 +90,11 @@ class DeviceLink(ABC, Generic[T]):
 class Link(DeviceLink[T]):
     """The link of a ``Session`` over a byte stream.
 
-    It ticks every ``tick_s`` seconds, or as often as the session wants it if that is more often.
+    It ticks every ``tick_s`` seconds, or as often as the session wants it if that is more often. Readings may wait for
+    others for ``gather_s``, which can be changed at any time; states never wait.
     """
+
+    gather_s = 0.0
 
     def __init__(
         self,
@@ -215,47 +112,21 @@ class Link(DeviceLink[T]):
     async def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
         session = self._session()  # before the stream: settings that cannot be leave nothing open
         stream = await self._open()
-        tick_s = self._tick_s
-        if isinstance(session, Paced):
-            tick_s = min(tick_s, max(session.tick_s, _SHORTEST_TICK_S))
-        clock = asyncio.get_running_loop().time
-        alive, frames = clock(), 0
+        conversation = Conversation(
+            session,
+            stream,
+            alive=self._alive,
+            silence=self._silence,
+            tick_s=self._tick_s,
+            gather_s=lambda: self.gather_s,
+        )
         try:
-            session.opened()
-            stream.write(session.output())
-            due, polled = clock(), isinstance(session, Polled)
-            tick_s = session.tick_s if isinstance(session, Polled) else tick_s
-            while True:
-                if polled:
-                    due = max(due + tick_s, clock())
-                    await asyncio.sleep(due - clock())
-                    data = await _within(_SHORTEST_TICK_S, stream.read())
-                else:
-                    data = await _within(tick_s, stream.read())
-                if data == b"":
-                    return
-                items = session.receive(data) if data else ()
-                if session.frames > frames:
-                    alive, frames = clock(), session.frames
-                    states = self._alive() if session.ready else []
-                else:
-                    states = self._silence(clock() - alive)
-                for state in states:
-                    yield state
-                if items:
-                    yield items
-                session.tick()
-                stream.write(session.output())
+            conversation.begin()
+            while heard := await conversation.heard():
+                for item in heard:
+                    yield item
         finally:
+            conversation.end()
             with contextlib.suppress(DeviceFault):
                 stream.write(session.closing())
             await stream.close()
-
-
-async def _within(seconds: float, awaitable: Awaitable[bytes]) -> bytes | None:
-    """The result, or None where it took longer."""
-    try:
-        async with asyncio.timeout(seconds):
-            return await awaitable
-    except TimeoutError:
-        return None

@@ -5,10 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import socket
 import sys
-from collections import deque
 from collections.abc import AsyncGenerator, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -17,9 +16,6 @@ from tms_agents.config import LocalPath, Section
 from tms_agents.devices.transport import DeviceState, Link, Opener, Stream, tcp
 from tms_agents.hand.states import StateLines, StateMessage
 from tms_agents.readers import Port
-
-#: Datagrams that wait; beyond this the oldest is worth less than the newest.
-_MAX_DATAGRAMS = 1000
 
 
 class TcpStates(Section):
@@ -83,8 +79,14 @@ def _name(source: StateSource) -> str:
 
 
 async def _unix(path: str) -> Stream:
-    reader, writer = await asyncio.open_unix_connection(path)
-    return Stream(reader, writer.transport, writer.close)
+    connection = socket.socket(socket.AF_UNIX)
+    try:
+        connection.setblocking(False)
+        await asyncio.get_running_loop().sock_connect(connection, path)
+    except BaseException:
+        connection.close()
+        raise
+    return Stream(connection.fileno(), connection.close)
 
 
 class _Listening(Stream):
@@ -93,46 +95,29 @@ class _Listening(Stream):
     def write(self, data: bytes) -> None:
         assert not data
 
-    def unsent(self) -> int:
-        return 0
-
 
 async def _stdin() -> Stream:
     """Standard input, which must be a pipe or a terminal."""
-    loop = asyncio.get_running_loop()
-    reader = asyncio.StreamReader()
     # A copy: closing it leaves standard input for the next attempt.
-    pipe = os.fdopen(os.dup(sys.stdin.fileno()), "rb", 0)
-    transport, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), pipe)
-    return _Listening(reader, asyncio.WriteTransport(), transport.close)
+    pipe = os.dup(sys.stdin.fileno())
+    return _Listening(pipe, lambda: os.close(pipe))
 
 
 async def _udp(host: str, port: int) -> Stream:
-    loop = asyncio.get_running_loop()
-    inbox = _Inbox()
-    transport, _ = await loop.create_datagram_endpoint(lambda: inbox, local_addr=(host, port))
-    return _Datagrams(asyncio.StreamReader(), asyncio.WriteTransport(), transport.close, inbox)
+    addresses = await asyncio.get_running_loop().getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+    family, kind, protocol, _, address = addresses[0]
+    inbox = socket.socket(family, kind, protocol)
+    try:
+        inbox.bind(address)
+    except BaseException:
+        inbox.close()
+        raise
+    return _Datagrams(inbox.fileno(), inbox.close)
 
 
-class _Inbox(asyncio.DatagramProtocol):
-    def __init__(self) -> None:
-        self.waiting: deque[bytes] = deque(maxlen=_MAX_DATAGRAMS)
-        self.came = asyncio.Event()
-
-    def datagram_received(self, data: bytes, addr: object) -> None:
-        self.waiting.append(data)
-        self.came.set()
-
-
-@dataclass(slots=True)
 class _Datagrams(_Listening):
     """Datagrams as lines, also where the robot leaves out the newline."""
 
-    inbox: _Inbox
-
-    async def read(self) -> bytes:
-        await self.inbox.came.wait()
-        self.inbox.came.clear()
-        data = b"".join(one + b"\n" for one in self.inbox.waiting)
-        self.inbox.waiting.clear()
-        return data
+    def read(self) -> bytes | None:
+        data = super().read()
+        return None if data is None else data + b"\n"

@@ -8,6 +8,7 @@ missing cannot be told: a board that does so again and again is a fault.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -44,8 +45,14 @@ class RosTmsBoardBurst(Outgoing):
         if not 1 <= cells <= len(INDEX):
             raise ValueError(f"a board has 1 to {len(INDEX)} cells, not {cells}")
         super().__init__()
-        self.frames, self.ready, self.tick_s = 0, False, period_s
-        self._cells, self._reply_s, self._quiet_s, self._clock = cells, reply_s, quiet_s, clock
+        self.frames, self.ready = 0, False
+        self._period_s, self._cells, self._reply_s, self._quiet_s, self._clock = (
+            period_s,
+            cells,
+            reply_s,
+            quiet_s,
+            clock,
+        )
         self._lines = LineParser(LONGEST_LINE)
         self._numbers: list[float] = []
         self._asked_at: float | None = None
@@ -74,6 +81,12 @@ class RosTmsBoardBurst(Outgoing):
             self.frames += self._cells
             self.ready = True
         return done
+
+    @property
+    def tick_s(self) -> float:
+        """Seconds to the next multiple of the period, so that what else this process does falls together with it."""
+        now = self._clock()
+        return (math.floor(now / self._period_s + 1e-3) + 1) * self._period_s - now
 
     def tick(self) -> None:
         now = self._clock()

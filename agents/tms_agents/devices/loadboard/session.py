@@ -8,9 +8,9 @@ An answer does not say which cell it is of, so one question is on the way at a t
 * a line that nobody asked for says that an earlier answer was shifted to the next cell: the whole round is dropped, and
   the pause, which was too short for this board, is doubled for a while.
 
-So that the last of these is seen in time, a round is kept back until the line was quiet for twice the slowest of the
-last answers, and handed out with the first answer of the next round. The numbers themselves carry no check sum: a wrong
-digit is for the estimator to find.
+So that the last of these is seen in time, a round is kept back until the next one is due and the line was quiet for
+twice the slowest of the last answers, and handed out with the first answer of the next round. The numbers themselves
+carry no check sum: a wrong digit is for the estimator to find.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from tms_agents.devices.outgoing import Outgoing
 #: Sensor index -> the character that asks for it.
 INDEX = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _NUMBER = re.compile(rb"[+-]?\d{1,10}")
-_OLD_FIRMWARE = re.compile(rb'[OK"]')
+_OLD_FIRMWARE = b'OK"'
 #: Bytes of a line, at most.
 LONGEST_LINE = 40
 #: A cell that missed this many answers in a row is asked less often, so that it does not slow down the others.
 _MISSES = 3
-#: The line counts as quiet only after that many looks at it: this process may itself have slept in between.
-_LOOKS = 3
 #: How fast the slowest answer is forgotten, per answer, and a doubled pause, per round; the longest pause.
 _FORGET, _RELAX = 0.999, 0.998
 _LONGEST_PAUSE_S = 2.0
+#: Shares of a period: how long a line must be quiet after a round at least, how early a timer may ring.
+_LEAST_QUIET, _EARLY = 0.3, 1e-3
 
 
 class RosTmsBoardSession(Outgoing):
@@ -65,7 +65,6 @@ class RosTmsBoardSession(Outgoing):
         super().__init__()
         self.frames = 0
         self.ready = False
-        self.tick_s = period_s / 10  # a round ends only after some looks at a quiet line
         #: Rounds thrown away because an answer came that nobody had asked for.
         self.doubtful_rounds = 0
         self._period_s, self._reply_s, self._late_s, self._retry_s = period_s, reply_s, late_s, retry_s
@@ -77,7 +76,7 @@ class RosTmsBoardSession(Outgoing):
         self._round: list[int] = []  # cells still to ask
         self._asked: int | None = None
         self._asked_at = self._heard_at = self._next_round = clock()
-        self._draining, self._open_round, self._looks = True, False, 0
+        self._draining, self._open_round, self._overdue = True, False, False
         self._slowest_s, self._pause_s = 0.0, late_s
         self._done: list[LoadSample] = []
 
@@ -87,38 +86,60 @@ class RosTmsBoardSession(Outgoing):
 
     def receive(self, data: bytes) -> list[LoadSample]:
         now = self._heard_at = self._clock()
-        self._looks = 0
+        self._overdue = False
         for line in self._lines.feed(data):
             self._line(answer_in(line), now)
         done, self._done = self._done, []
         return done
 
+    @property
+    def tick_s(self) -> float:
+        """Seconds until something is due."""
+        return 0.0 if self._overdue else self._due() - self._clock()
+
     def tick(self) -> None:
         now = self._clock()
-        self._looks += 1
+        if now < self._due():
+            return
+        # This process may have slept between its look at the line and now: quiet is what was so at a second look.
+        self._overdue = not self._overdue and not self._idle
+        if self._overdue:
+            return
         if self._asked is not None:
-            if self._quiet(now - self._asked_at, self._reply_s):
-                self._miss(now)
+            self._miss(now)
         elif self._draining:
-            if self._quiet(now - self._heard_at, self._pause_s):
-                self._lines.expire()
-                self._draining = False
-                self._ask_next(now)
-        elif self._open_round and self._quiet(now - self._heard_at, min(2 * self._slowest_s, self._late_s)):
+            self._lines.expire()
+            self._draining = False
+            self._ask_next(now)
+        elif self._open_round:
             self._finish()
-        if self._asked is None and not self._draining and not self._open_round and now >= self._next_round:
+        if self._idle and now >= self._next_round:
             self._start(now)
+
+    @property
+    def _idle(self) -> bool:
+        return self._asked is None and not self._draining and not self._open_round
+
+    def _due(self) -> float:
+        """When the line has been quiet for long enough; while nothing is under way, when the next round begins."""
+        if self._asked is not None:
+            return self._asked_at + self._reply_s
+        if self._draining:
+            return self._heard_at + self._pause_s
+        if self._open_round:
+            # Not before the next round begins: that is one wake-up for both.
+            quiet_s = min(max(2 * self._slowest_s, _LEAST_QUIET * self._period_s), self._late_s)
+            return max(self._heard_at + quiet_s, self._next_round)
+        return self._next_round
 
     @property
     def pending(self) -> int:
         """Bytes of an incomplete line."""
         return self._lines.pending
 
-    def _quiet(self, since_s: float, enough_s: float) -> bool:
-        return since_s >= enough_s and self._looks >= _LOOKS
-
     def _start(self, now: float) -> None:
-        self._next_round = max(self._next_round + self._period_s, now)
+        # Rounds begin at multiples of the period, so that what else this process does falls together with them.
+        self._next_round = (math.floor(now / self._period_s + _EARLY) + 1) * self._period_s
         self._values = [float("nan")] * len(self._values)
         self._round = [
             cell for cell in range(len(self._values)) if self._misses[cell] < _MISSES or now >= self._ask_again[cell]
@@ -128,7 +149,7 @@ class RosTmsBoardSession(Outgoing):
 
     def _ask_next(self, now: float) -> None:
         if self._round:
-            self._asked, self._asked_at, self._looks = self._round.pop(0), now, 0
+            self._asked, self._asked_at, self._overdue = self._round.pop(0), now, False
             self._output += INDEX[self._asked].encode()
 
     def _line(self, line: bytes, now: float) -> None:
@@ -152,7 +173,7 @@ class RosTmsBoardSession(Outgoing):
         self._misses[self._asked] += 1
         self._ask_again[self._asked] = now + self._retry_s
         self._asked, self._draining = None, True
-        self._heard_at, self._looks = now, 0
+        self._heard_at, self._overdue = now, False
 
     def _drop(self) -> None:
         self.doubtful_rounds += bool(self._open_round or self._done)
@@ -174,7 +195,7 @@ class RosTmsBoardSession(Outgoing):
 
 def answer_in(line: bytes) -> bytes:
     """A line without what older firmware says around its numbers; empty where that is all."""
-    return _OLD_FIRMWARE.sub(b"", line).strip()
+    return line.translate(None, _OLD_FIRMWARE).strip()
 
 
 def number_in(answer: bytes) -> float | None:

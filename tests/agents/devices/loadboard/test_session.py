@@ -33,6 +33,7 @@ class Wire:
         self.session = kind(clock=clock, **options)
         self.session.opened()
         self.noise = self.arrived = b""
+        self.due = 0.0
 
     def run(self, seconds: float, latency_s=lambda: 0.0) -> list:
         samples = []
@@ -42,13 +43,17 @@ class Wire:
             arrived = self.device.receive(self.session.output()) + self.device.tick() + self.noise
             self.noise = b""
             self.arrived += arrived
-            # A polled session is looked after once per tick, any other one at every byte and often.
-            if getattr(self.session, "polled", False) and round(self.now * 1000) % round(self.session.tick_s * 1000):
+            # As a link does: a polled session is looked after when it wants to be, any other one at every byte, too.
+            if self.now < self.due and (getattr(self.session, "polled", False) or not self.arrived):
                 continue
-            if self.arrived:
-                samples += self.session.receive(self.arrived)
-                self.arrived = b""
-            self.session.tick()
+            for _ in range(2):
+                if self.arrived:
+                    samples += self.session.receive(self.arrived)
+                    self.arrived = b""
+                self.session.tick()
+                if self.session.tick_s > 0:
+                    break
+            self.due = self.now + self.session.tick_s - 1e-6
         return samples
 
 

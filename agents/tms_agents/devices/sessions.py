@@ -1,0 +1,61 @@
+"""What a driver is: the protocol of a device without I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeVar, runtime_checkable
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+class DeviceFault(Exception):
+    """The device refuses or answers nonsense; the text says why. The link starts anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceState:
+    state: Literal["connected", "silent", "faulty"]
+    why: str = ""
+
+
+class Session(Protocol[T_co]):
+    """The protocol of one connection, without I/O. Each method may raise ``DeviceFault``."""
+
+    #: Valid frames so far: the sign of life. ``ready``: the device is set up and delivers.
+    frames: int
+    ready: bool
+
+    def opened(self) -> None:
+        """The stream is open."""
+
+    def receive(self, data: bytes) -> Sequence[T_co]:
+        """Take bytes in pieces of any size; returns the readings they complete."""
+
+    def tick(self) -> None:
+        """Called several times a second, more often where the session is ``Paced``: poll, keep alive.
+
+        What had arrived by the call of a tick, but for the moment it takes to call it, was received before.
+        """
+
+    def output(self) -> bytes:
+        """Bytes to send now; each is given out once."""
+
+    def closing(self) -> bytes:
+        """What to send before the stream is closed on our side."""
+
+
+@runtime_checkable
+class Paced(Protocol):
+    """A session that says itself when it is to be ticked, at the latest."""
+
+    @property
+    def tick_s(self) -> float:
+        """Seconds from now; asked again after every tick. 0: at once, after one more look at the line."""
+
+
+@runtime_checkable
+class Polled(Paced, Protocol):
+    """A paced session whose input is looked at when it is ticked, not at every byte: far fewer wake-ups."""
+
+    polled: bool
