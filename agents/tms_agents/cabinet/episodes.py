@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,29 +18,27 @@ import numpy as np
 from tms_agents.cabinet.blocks import Block
 from tms_agents.cabinet.densities import PutDensity, normal
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
-from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.plans import Known, plans_of
 from tms_agents.cabinet.stays import Thing
-from tms_agents.cabinet.wandering import misfit, pulls_of
+from tms_agents.cabinet.ways import WAY, way_odds
 
-#: Log-probability of so many changes between two rests; a thing that was put elsewhere is one change.
-_CHANGES = [math.log(p) for p in (0.05, 0.75, 0.17, 0.02, 0.002, 1e-4, 1e-5)]
-#: A new thing has a tag; one of the tags in view that nobody put there belongs to something else.
-_TAGGED, _UNTAGGED, _ELSEWHERE = math.log(0.8), math.log(0.2), math.log(0.03)
 #: A level at rest is never known better than this.
 _FLOOR_G = 1.5
 #: How often a thing was measured badly before, or a zero has moved, by so much at least; how far known weights are
 #: trusted.
-_LOOSE, _BADLY_G, _TRUST = 0.02, 6.0, 0.95
+_LOOSE, _BADLY_G, _TRUST = 0.05, 6.0, 0.95
+#: The same while something shakes the board.
+_SHAKEN, _SHAKEN_G = 0.4, 9.0
 #: Outcomes so much less probable by tags alone than the best one are not weighed, nor more than so many.
 _HOPELESS, _MOST, _MOST_PATHS = 25.0, 250, 12
-#: Misfit of a block of the way that counts, what a hand adds to a load in other directions, and how much of it counts.
-_CAP, _HAND, _WAY = 12.0, 0.03, 0.35
-_WAY_BLOCKS = 600
+#: Blocks of the way that are kept, and the most that a misfit of it counts (log-odds).
+_WAY_BLOCKS, _MOST_ODDS = 600, 3.0
+#: The least weight of a thing, and how many of its standard deviations it must be.
+_LEAST_G, _CLEAR = 14.0, 2.0
 #: The centre of two is somewhere in the middle rather than anywhere (log density).
 _IN_THE_MIDDLE = math.log(1.5)
-#: How often a thing is also put elsewhere when others come or go, something happens that nobody can explain,
-#: and a thing goes that nobody knew of.
-_ASIDE, _UNKNOWN, _UNLISTED = math.log(0.03), math.log(1e-3), math.log(5e-3)
+#: How often something happens that nobody can explain, and a thing goes that nobody knew of.
+_UNKNOWN, _UNLISTED = math.log(1e-3), math.log(5e-3)
 #: How often a thing is slid rather than lifted and put down.
 _SLID = 0.02
 
@@ -54,8 +52,6 @@ class Episode:
     things: Sequence[Thing]
     onset: float
     way: list[tuple[Array, Array]] = field(default_factory=list)
-    #: When it was looked at last.
-    looked: float = -math.inf
 
     def add(self, block: Block) -> None:
         if len(self.way) < _WAY_BLOCKS:
@@ -78,97 +74,74 @@ class Outcome:
     known: bool = True
 
 
-#: Log-likelihood of the rounds since the board rests, if the tag is there and if it is not.
-TagOdds = Callable[[str], tuple[float, float]]
-
-
 def outcomes(
-    episode: Episode,
-    now: float,
-    level: Array,
-    variance: Array,
-    odds: TagOdds,
-    tags: Collection[str],
-    weight: Callable[[str], KnownWeight | None],
-    geometry: Geometry,
-    settings: EstimatorSettings,
+    episode: Episode, now: float, level: Array, variance: Array, known: Known, geometry: Geometry, creep_per_hour: float
 ) -> list[Outcome]:
-    """``tags``: those in view that were at no thing before. All outcomes with their posterior probabilities as scores, the most probable first."""
-    change = level - episode.level
-    spread = variance + episode.variance + _FLOOR_G**2
+    """All outcomes of the ``episode``, given that the board rests at ``level`` (k,) g with errors of ``variance`` (k,).
+
+    Scores are posterior probabilities, the most probable first; among them is one that nothing explains it.
+    """
+    change, spread = level - episode.level, variance + episode.variance + _FLOOR_G**2
     things = {thing.id: thing for thing in episode.things}
-    noises = {thing.id: thing.at(now, settings.creep_per_hour) for thing in episode.things}
-
-    def put(count: int, of: list[KnownWeight]) -> PutDensity:
-        return PutDensity(
-            geometry, settings.min_weight_g * count, of, trust=_TRUST if of else 0.5, clear=2.0
-        )
-
-    plans = sorted(_plans(list(things.values()), tags, odds), key=lambda plan: -plan[0])[:_MOST]
+    noises = {thing.id: thing.at(now, creep_per_hour) for thing in episode.things}
+    plans = sorted(plans_of(episode.things, known), key=lambda plan: -plan.prior)[:_MOST]
     found: list[Outcome] = []
     for prior, gone, new in plans:
-        if prior < plans[0][0] - _HOPELESS:
+        if prior < plans[0].prior - _HOPELESS:
             break
-        left = change + sum((things[i].load for i in gone), np.zeros_like(change))
-        both = spread + sum((noises[i] for i in gone), np.zeros_like(change))
+        left = change + sum((things[i].load for i in sorted(gone)), np.zeros_like(change))
+        both = spread + sum((noises[i] for i in sorted(gone)), np.zeros_like(change))
+        one = _not_told_apart(gone, things)
         if new:
-            of = _expected([things[i] for i in gone], new, weight)
-            density = put(len(new), of)(left, both)
-            if len(new) == 2:
-                density += _IN_THE_MIDDLE
-        elif (one := _not_told_apart(gone, things)) is not None:
+            density = _of_new(left, both, new, [things[i] for i in sorted(gone)], known, geometry)
+        elif one is not None:
             # Only the sum of it and of others was known: it stood anywhere.
-            alone = PutDensity(geometry, settings.min_weight_g, [KnownWeight(*_weight(one))], trust=_TRUST, clear=2.0)
+            alone = PutDensity(geometry, _LEAST_G, [_weight(one)], trust=_TRUST, clear=_CLEAR)
             density = alone(one.load - left, both - noises[one.id])
         else:
-            badly = both + _BADLY_G**2 + sum(((0.1 * np.abs(things[i].load)) ** 2 for i in gone), np.zeros_like(change))
-            density = float(np.logaddexp(math.log(1 - _LOOSE) + normal(left, both), math.log(_LOOSE) + normal(left, badly)))
+            density = _of_nothing(left, both, [things[i] for i in sorted(gone)], known.shaking)
         if density > -math.inf:
             found.append(Outcome(gone, new, prior + density, left, both))
-    found.sort(key=lambda one: -one.score)
-    found = found[:_MOST_PATHS]
+    found = sorted(found, key=lambda outcome: -outcome.score)[:_MOST_PATHS]
+    ways = [_way(episode, outcome, things, geometry) for outcome in found]
+    best = max(ways, default=0.0)
     weighed = [
-        replace(one, score=one.score + _way(episode, one, things, geometry) + _lifted(episode, one, things))
-        for one in found
+        replace(outcome, score=outcome.score - _dampened(best - way) + _lifted(episode, outcome, things))
+        for outcome, way in zip(found, ways, strict=True)
     ]
-    unlisted = PutDensity(geometry, settings.min_weight_g, clear=2.0)
-    anything = float(np.logaddexp(_UNKNOWN + unlisted.anything(change, spread), _UNLISTED + unlisted(-change, spread)))
-    prior = sum(max(odds(tag)) for tag in {*tags, *(one.tag for one in episode.things if one.tag is not None)})
-    way = -0.5 * _WAY * len(change) * len(episode.way)
-    weighed.append(Outcome(frozenset(), (), anything + prior + way, change, spread, known=False))
-    return _normalised(weighed)
+    return _normalised([*weighed, _unexplained(episode, change, spread, known, geometry, best)])
 
 
-def _plans(
-    things: Sequence[Thing], others: Collection[str], odds: TagOdds
-) -> Iterator[tuple[float, frozenset[int], tuple[str | None, ...]]]:
-    """Prior and tags of everything that may have happened."""
-    tags = {thing.id: thing.tag for thing in things}
-    present, absent = {}, {}
-    for tag in {*others, *(tag for tag in tags.values() if tag is not None)}:
-        present[tag], absent[tag] = odds(tag)
-    stay = sum(present[tag] for tag in tags.values() if tag is not None)
-    astray = {tag: max(absent[tag], _ELSEWHERE + present[tag]) for tag in present}
-    free = [tag for tag in others if tag not in tags.values()]
-    nobody = sum(astray[tag] for tag in free)
-    most = 3 if len(things) <= 10 else 2
-    for count in range(min(most, len(things)) + 1):
-        for group in itertools.combinations(things, count):
-            gone = frozenset(thing.id for thing in group)
-            lifted = [tag for thing in group if (tag := thing.tag) is not None]
-            untagged = count - len(lifted)
-            without = stay + nobody + sum(astray[tag] - present[tag] for tag in lifted)
-            choice: list[str | None] = [*free, *lifted, None, None]
-            for number in range(3):
-                for new in dict.fromkeys(itertools.combinations(choice, number)):
-                    same = sum(tag in lifted for tag in new)
-                    same += min(untagged, sum(tag is None for tag in new))
-                    changes = count + number - same
-                    aside = max(same - 1, 0) if changes == same else same
-                    prior = aside * _ASIDE + _CHANGES[min(changes, len(_CHANGES) - 1)] - count * math.log(max(len(things), 1))
-                    for tag in new:
-                        prior += _UNTAGGED if tag is None else present[tag] - astray[tag] + _TAGGED
-                    yield prior + without, gone, new
+def _of_new(
+    load: Array,
+    variance: Array,
+    new: Sequence[str | None],
+    gone: Sequence[Thing],
+    known: Known,
+    geometry: Geometry,
+) -> float:
+    """Log density of a load that is that of the ``new`` things."""
+    of = _expected(gone, new, known.weight)
+    put = PutDensity(geometry, _LEAST_G * len(new), of, trust=_TRUST if of else 0.5, clear=_CLEAR)
+    return put(load, variance) + (_IN_THE_MIDDLE if len(new) == 2 else 0.0)
+
+
+def _of_nothing(left: Array, variance: Array, gone: Sequence[Thing], shaking: bool) -> float:
+    """Log density of what is left and should be nothing: but for noise, or for what was measured badly."""
+    share, far = (_SHAKEN, _SHAKEN_G) if shaking else (_LOOSE, _BADLY_G)
+    badly = variance + far**2 + sum(((0.1 * np.abs(thing.load)) ** 2 for thing in gone), np.zeros_like(left))
+    return float(np.logaddexp(math.log(1 - share) + normal(left, variance), math.log(share) + normal(left, badly)))
+
+
+def _unexplained(
+    episode: Episode, change: Array, spread: Array, known: Known, geometry: Geometry, best_way: float
+) -> Outcome:
+    """Nobody knows what happened, or a thing went that nobody knew of."""
+    put = PutDensity(geometry, _LEAST_G, clear=_CLEAR)
+    score = float(np.logaddexp(_UNKNOWN + put.anything(change, spread), _UNLISTED + put(-change, spread)))
+    score += sum(max(known.odds(tag)) for tag in sorted({*known.tags, *(one.tag for one in episode.things if one.tag)}))
+    score -= _dampened(best_way + 0.5 * WAY * len(change) * len(episode.way))
+    return Outcome(frozenset(), (), score, change, spread, known=False)
 
 
 def _expected(
@@ -196,41 +169,21 @@ def _not_told_apart(gone: Collection[int], things: Mapping[int, Thing]) -> Thing
     return found[0] if len(found) == 1 else None
 
 
-def _weight(thing: Thing) -> tuple[float, float]:
-    if thing.known is not None:
-        return thing.known.mean_g, thing.known.sd_g
+def _weight(thing: Thing) -> KnownWeight:
     weight = float(thing.load.sum())
-    return weight, 0.1 * weight + 5.0
+    return thing.known or KnownWeight(weight, 0.1 * weight + 5.0)
+
+
+def _dampened(odds: float) -> float:
+    """An arm, a slide or a hand also leads a load astray: the way alone never decides."""
+    return _MOST_ODDS * math.tanh(odds / _MOST_ODDS)
 
 
 def _way(episode: Episode, outcome: Outcome, things: Mapping[int, Thing], geometry: Geometry) -> float:
-    """How well the way of the load fits: on it the load is made of parts of what went and what came."""
-    if not episode.way:
-        return 0.0
-    path = np.array([mean for mean, _ in episode.way])
-    force = (path**2).sum(axis=1)
-    sd = np.sqrt(np.array([variance for _, variance in episode.way]) + (_HAND**2 * force / path.shape[1])[:, None])
-    directions = [things[i].load for i in outcome.gone]
+    loads = [things[i].load for i in sorted(outcome.gone)]
     if outcome.new:
-        directions.append(outcome.load)
-    common = np.sqrt((sd**2).mean(axis=0))
-    weight = np.linalg.norm(common) / np.linalg.norm(sd, axis=1)
-    scaled = path / common * weight[:, None]
-    pulls = pulls_of(path, geometry) / common[:, None] * weight[:, None, None]
-    if directions:
-        basis, size, _ = np.linalg.svd((np.array(directions) / common).T, full_matrices=False)
-        basis = basis[:, size > 1e-3 * size[0]]
-        scaled = scaled - (scaled @ basis) @ basis.T
-        pulls = pulls - np.einsum("tkb,kr,lr->tlb", pulls, basis, basis)
-        rank = basis.shape[1]
-    else:
-        rank = 0
-    if len(outcome.new) == 2 and rank < path.shape[1]:
-        # They came one after the other, or not: one more direction, whatever it is.
-        _, vectors = np.linalg.eigh(scaled.T @ scaled)
-        scaled = scaled - np.outer(scaled @ vectors[:, -1], vectors[:, -1])
-        rank += 1.5
-    return -0.5 * _WAY * (misfit(scaled, pulls, _CAP) + rank * len(path))
+        loads.append(outcome.load)
+    return way_odds(episode.way, loads, geometry, free=len(outcome.new) == 2)
 
 
 def _lifted(episode: Episode, outcome: Outcome, things: Mapping[int, Thing]) -> float:

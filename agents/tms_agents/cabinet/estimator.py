@@ -12,14 +12,13 @@ import numpy as np
 from tms_agents.cabinet.balance import Balance, search
 from tms_agents.cabinet.blocks import Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
-from tms_agents.cabinet.episodes import Episode, outcomes
 from tms_agents.cabinet.events import CabinetEvent, Stay
 from tms_agents.cabinet.fusion import Evidence, Explanation, explain
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
+from tms_agents.cabinet.hindsight import Hindsight
 from tms_agents.cabinet.naming import Namer
 from tms_agents.cabinet.noise import Noise
 from tms_agents.cabinet.presence import Presence
-from tms_agents.cabinet.revising import Revision, current, order
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step, StepDetector
@@ -27,9 +26,10 @@ from tms_agents.cabinet.wobble import Wobble
 
 #: An unclear level that the load left sooner than this was one in passing.
 _PASSING_S = 0.8
-#: How long the load must rest before its sum is believed, how sure another explanation must be, and how long a lifted
+#: How long the load must rest before its sum is believed, and before what it says is corrected (everything since the
+#: last rest has been looked at by then), how sure another explanation must be, and how long a lifted
 #: thing's tag may stay in view in the hand.
-_BALANCE_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 0.9, 0.8
+_BALANCE_S, _CORRECT_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 4.0, 0.9, 0.8
 #: Rounds that must have told of a tag before its thing is one of several that changed at once.
 _HEARD = 2
 #: Several at once are believed only at a level that is no pause between them.
@@ -38,9 +38,6 @@ _SEVERAL_S = 0.7
 _JUMP_G = 6.0
 #: A block so near the resting level tells how much it wobbles.
 _NEAR_G = 50.0
-#: An episode is looked at as a whole when the board has rested so long, and closed when it has rested so long; another
-#: outcome must be so sure, and what was told so improbable.
-_REVISE_S, _CLOSED_S, _REVISE_SURE, _REVISE_DOUBT = 1.5, 4.0, 0.9, 0.05
 
 
 class CabinetEstimator:
@@ -70,13 +67,12 @@ class CabinetEstimator:
         self._interrupted: float | None = None
         self._looked = -math.inf
         self._rested = -math.inf
-        self._before: list[Thing] | None = None
-        self._episode: Episode | None = None
 
     def _connect(self) -> None:
         self._book = Bookkeeper(self._shelf, self._settings)
         self._balance = Balance(self._shelf, self._settings)
         self._namer = Namer(self._shelf, self._presence, self._zones, self._known, self._settings)
+        self._hindsight = Hindsight(self._shelf, self._presence, self._namer, self._settings)
 
     # --- input
 
@@ -92,6 +88,7 @@ class CabinetEstimator:
                 self._interrupted = t
                 self._detector.interrupt()
                 self._noise.interrupt()
+                self._hindsight.interrupt()
             return []
         if done is None:
             return []
@@ -99,18 +96,16 @@ class CabinetEstimator:
         self._noise.learn(block, samples)
         level = self._detector.level
         near = level.known and float(np.abs(block.mean - level.mean).max()) < _NEAR_G
+        self._wobble.hear(float(block.variance.mean()) * block.n, block.end - block.start)
         self._wobble.push(t, block.mean, block.variance, near)
         block.variance = block.variance + self._wobble.variance
         if self._interrupted is not None:
             self._drifted(block.start - self._interrupted)
             self._interrupted = None
+        self._balance.shaking = self._wobble.shaking
         step = self._detector.push(block)
-        if not self._detector.resting and self._before is not None:
-            level = self._detector.level
-            self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start)
-            self._before = None
-        if self._episode is not None and not self._detector.resting:
-            self._episode.add(block)
+        if not self._detector.resting:
+            self._hindsight.changing(block, self._detector.level)
         if step is not None:
             return self._explain(step)
         if self._detector.resting and t - self._looked > 0.5:
@@ -168,55 +163,16 @@ class CabinetEstimator:
         events = self._book.rest(t, level, variance)
         if seconds < _BALANCE_S:
             return events
-        if self._episode is not None and seconds >= _REVISE_S:
-            events += self._revise(t, level, variance)
+        if self._settings.knows_places:
+            rested, shaking = self._rested, self._wobble.shaking
+            revised = self._hindsight.rest(t, level, variance, seconds, rested, shaking=shaking)
+            if revised:
+                self._book.settling = None
+                events += revised
         step = self._balance.rest(t, level, variance)
-        if step is not None and seconds >= _CLOSED_S:
+        if step is not None and seconds >= _CORRECT_S:
             events += self._correct(step)
-        if seconds >= _REVISE_S:
-            if seconds >= _CLOSED_S:
-                self._episode = None
-            self._before = [
-                replace(thing, load=thing.load.copy(), variance=thing.variance.copy())
-                for thing in self._shelf.things.values()
-            ]
         return events
-
-    def _revise(self, t: float, level: Array, variance: Array) -> list[CabinetEvent]:
-        """Now that the board rests: is what was told since the last rest still the most probable?"""
-        assert self._episode is not None
-        for thing in self._episode.things:
-            if thing.id in self._shelf.things:
-                thing.tag = self._shelf.things[thing.id].tag
-        since = self._rested + _IN_HAND_S
-        hit, false = self._settings.read_probability, self._settings.false_read_probability
-
-        def odds(tag: str) -> tuple[float, float]:
-            read, missed = self._presence.looks(tag, since)
-            there = read * math.log(hit) + missed * math.log(1 - hit)
-            gone = read * math.log(false) + missed * math.log(1 - false)
-            return float(np.logaddexp(there, -12.0)), float(np.logaddexp(gone, -12.0))
-
-        tags = {*self._namer.loose(), *(thing.tag for thing in self._shelf.things.values() if thing.tag is not None)}
-        found = outcomes(
-            self._episode, t, level, variance, odds, tags, self._namer.weight, self._geometry, self._settings
-        )
-        if not found:
-            return []
-        gone, new = current(self._episode, self._shelf)
-        told = sum(one.score for one in found if one.known and (one.gone, order(list(one.new))) == (gone, new))
-        best = found[0]
-        if not best.known or (best.gone, order(list(best.new))) == (gone, new) or best.score < _REVISE_SURE or told > _REVISE_DOUBT:
-            return []
-        events = Revision(
-            self._shelf, self._episode, best, t, pin=self._namer.pin, left=lambda thing: self._left(thing, t), weight=self._namer.weight
-        ).events()
-        self._book.settling = None
-        return events
-
-    def _left(self, thing: Thing, t: float) -> None:
-        at = thing.centre(self._geometry)
-        self._namer.left(thing, t, at.weight_g, at.weight_sd_g)
 
     def _correct(self, step: Step) -> list[CabinetEvent]:
         """The sum of the stays is not what the cells show: what is more probable?"""
@@ -242,7 +198,7 @@ class CabinetEstimator:
         whole = self._whole(step)
         evidence = self._evidence(step)
         if whole is not None:
-            evidence = replace(evidence, left=(whole.change, whole.variance))
+            evidence = replace(evidence, left=(whole.change, whole.variance), shaking=self._wobble.shaking)
         explanations = explain(step, self._shelf, evidence, self._settings)
         if steady > self._settings.patience_s and waited > self._settings.stubborn_s:
             # No hand presses for so long.
@@ -333,8 +289,6 @@ class CabinetEstimator:
         self._rested = step.settled
         self._book.newest = []
         events = self._book.apply(step, explanation)
-        if self._book.settling is not None and self._book.settling.placed is not None:
-            self._detector.forget_before(self._book.settling.placed.ended)
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
         return events + self._namer.update(step.now, resting=self._detector.resting)

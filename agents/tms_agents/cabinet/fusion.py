@@ -47,12 +47,18 @@ _TWO_PUT, _TWO_PUT_TAGS = 0.02, 0.2
 _LOOSE_TRIED = 6
 #: How often a slid thing is steady while a hand still presses or pulls it.
 _PRESSED_SLIDE = 0.03
+#: A board that is shaken may swing by so much and so often; what looks like a slide is rarely one then.
+_SWING_G, _SWINGS, _STEADIER = 9.0, 0.3, 0.2
 #: How often a thing was measured badly: pressed, or under a leaning arm.
-_LOOSE = 0.01
+_LOOSE = 0.03
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
 _HAND_M, _CROWDED_M = 0.015, 0.03
 #: Two things put at once stand so far apart at least; nearer, it was one that was tilted (log-odds of the price).
 _ONE_M, _TWO_M, _TILTED = 0.06, 0.085, -8.0
+#: How far the centre of a thing that has just come shifts when it is set upright.
+_UPRIGHT_M = 0.003
+#: ... and what is left where a thing went is it (log-odds).
+_REMNANT = -4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,6 +107,8 @@ class Evidence:
     doubts: Sequence[Doubt] = ()
     #: What the load is beside zeros and stays after the step, (k,) g, and its variance: None while not known.
     left: tuple[Array, Array] | None = None
+    #: Something shakes the board, so that its level may swing.
+    shaking: bool = False
 
 
 def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
@@ -121,6 +129,9 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         # It makes good what was wrong before, so that everything fits now.
         settled = math.log(_PRIOR["settled"]) + normal(*evidence.left)
         found.append(Explanation("settled", settled))
+    if evidence.shaking:
+        swing = math.log(_PRIOR["settled"] * _SWINGS) + normal(change, variance + _SWING_G**2)
+        found.append(Explanation("settled", swing))
     each = math.log(1.0 / max(len(things), 1))
     noises = [thing.at(step.now, settings.creep_per_hour) for thing in things]
     taken = [evidence.taken(thing) for thing in things]
@@ -141,10 +152,10 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         if after > -math.inf:
             prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load, geometry)
             # A thing half lifted or tilted looks like a lighter one in its place.
-            crowd = crowded(left)
+            crowd = crowded(left) + _remnant(left, thing, geometry)
             found.append(Explanation("swap", prior + after + crowd, removed=(thing,), load=left))
             if settings.knows_places and abs(step.weight_g) < 0.5 * float(thing.load.sum()):
-                prior = math.log(_PRIOR["slide"]) + each - max(tag, 0.0)
+                prior = math.log(_PRIOR["slide"] * (_STEADIER if evidence.shaking else 1.0)) + each - max(tag, 0.0)
                 prior += max(path_odds(step, -thing.load, geometry, same_thing=True), 0.0)
                 still, pressed = put.slid(change, left, both)
                 found.append(Explanation("slide", prior + still, thing=thing, load=left))
@@ -155,7 +166,10 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
                 found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
             if settings.knows_places and thing is evidence.settling and evidence.settling_share > 0.01:
                 prior = math.log(_PRIOR["adjust"] * evidence.settling_share)
-                found.append(Explanation("adjust", prior + put.same_place(thing, step), thing=thing, load=left))
+                # The last of it may also set it upright: its whole load shifts a little.
+                upright = _UPRIGHT_M * float(thing.load.sum()) / max(abs(step.weight_g), 1.0)
+                here = put.same_place(thing, step, math.hypot(0.005, upright))
+                found.append(Explanation("adjust", prior + here, thing=thing, load=left))
     found += _taken_and_pressed(step, found, things, put)
     for doubt in evidence.doubts:
         for which, sign in ((doubt.thing, -1.0), (doubt.other, 1.0)):
@@ -184,6 +198,14 @@ def _crowded(load: Array, shelf: Shelf, gone: Thing | None = None) -> float:
         float(np.hypot(*(at - thing.centre(shelf.geometry).xy))) for thing in shelf.things.values() if thing is not gone
     ]
     return math.log(1.0 - 0.95 * math.exp(-0.5 * (min(near) / _CROWDED_M) ** 2)) if near else 0.0
+
+
+def _remnant(load: Array, gone: Thing, geometry: Geometry) -> float:
+    """What is a small part of the thing that went, and where that was, is hardly another thing."""
+    if float(load.sum()) > 0.3 * float(gone.load.sum()):
+        return 0.0
+    apart = math.dist(centre_free(load, geometry), gone.centre(geometry).xy)
+    return _REMNANT * math.exp(-0.5 * (apart / _ONE_M) ** 2)
 
 
 def _taken_and_pressed(

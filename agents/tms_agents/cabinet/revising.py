@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from tms_agents.cabinet.episodes import Episode, Outcome
-from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished
+from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
 from tms_agents.cabinet.geometry import Array, KnownWeight
 from tms_agents.cabinet.stays import Shelf, Thing
 
 #: A stay whose load changed by so much was slid; less is only known better.
 _SLID_G, _SLID_SHARE = 8.0, 0.05
+#: A place that is so much nearer to the truth is told.
+_MOVED_M = 0.03
 
 
 def current(episode: Episode, shelf: Shelf) -> tuple[frozenset[int], tuple[str | None, ...]]:
@@ -27,7 +29,7 @@ def current(episode: Episode, shelf: Shelf) -> tuple[frozenset[int], tuple[str |
     return frozenset(gone), order(new)
 
 
-def order(tags: list[str | None]) -> tuple[str | None, ...]:
+def order(tags: Iterable[str | None]) -> tuple[str | None, ...]:
     """Tags in one order, those that are None last."""
     return tuple(sorted(tags, key=lambda tag: (tag is None, tag or "")))
 
@@ -56,6 +58,7 @@ class Revision:
 
     def events(self) -> list[CabinetEvent]:
         """Change the shelf and tell of it: first what is not there, then what is."""
+        self._told_apart()
         before = {thing.id: thing for thing in self._episode.things}
         wanted = list(self._outcome.new)
         events: list[CabinetEvent] = []
@@ -66,13 +69,15 @@ class Revision:
             if now is None and i not in self._outcome.gone:
                 back.append(old)
             elif now is not None and i in self._outcome.gone:
-                if _slid(old, now) and now.tag in wanted:
+                if now.tag in wanted:
+                    # Lifted and put down so quickly that nobody saw the board without it, or slid.
                     wanted.remove(now.tag)
                     stays.append(now)
                 else:
                     events.append(self._remove(now))
             elif now is not None and _slid(old, now):
                 now.load, now.variance = old.load.copy(), old.variance.copy()
+                now.forget_place()
                 at = now.centre(self._shelf.geometry)
                 now.told = at.xy
                 events.append(Moved(self._now, now.id, at.xy, at.cov))
@@ -97,6 +102,20 @@ class Revision:
             old.id = self._shelf.next_id - 1
         return events + self._share(stays, wanted) + later
 
+    def _told_apart(self) -> None:
+        """One of several that came together has gone: what it weighed less than was thought, the others weigh more."""
+        gone, load = self._outcome.gone, self._outcome.load
+        others = [old for old in self._episode.things if old.joint & gone and old.id not in gone]
+        if self._outcome.new or not others:
+            return
+        for old in others:
+            old.load, old.joint = old.load + load / len(others), old.joint - gone
+            if len(others) == 1:
+                old.variance = 2 * self._outcome.variance
+            now = self._shelf.things.get(old.id)
+            if now is not None:
+                now.load, now.variance, now.joint = old.load.copy(), old.variance.copy(), old.joint
+
     def _remove(self, thing: Thing) -> Vanished:
         self._left(thing)
         at = thing.centre(self._shelf.geometry)
@@ -109,7 +128,8 @@ class Revision:
         if len(stays) + len(wanted) == 1:
             if wanted:
                 return self._put(load, variance, wanted[0], self._episode.onset)
-            stays[0].load, stays[0].variance = load.copy(), variance.copy()
+            stays[0].load, stays[0].variance, stays[0].joint = load.copy(), variance.copy(), frozenset()
+            stays[0].forget_place()
             return self._tell(stays)
         rest = load - sum((thing.load for thing in stays), np.zeros_like(load))
         if len(wanted) == 1:
@@ -134,7 +154,8 @@ class Revision:
             placed.append(self._shelf.things[self._shelf.next_id - 1])
         for thing in placed:
             thing.joint = frozenset(other.id for other in placed if other is not thing)
-        return told
+        ids = tuple(thing.id for thing in placed)
+        return [*told, LoadChanged(self._now, ids, float(load.sum()), float(np.sqrt(variance.sum())))]
 
     def _put(self, load: Array, variance: Array, tag: str | None, since: float) -> list[CabinetEvent]:
         thing = self._shelf.put(load.copy(), variance.copy(), since=since, onset=since)
@@ -150,15 +171,15 @@ class Revision:
         events: list[CabinetEvent] = []
         for thing in stays:
             at = thing.centre(self._shelf.geometry)
-            if float(np.hypot(*np.subtract(at.xy, thing.told))) > 0.015:
+            if float(np.hypot(*np.subtract(at.xy, thing.told))) > _MOVED_M:
                 thing.told = at.xy
                 events.append(Moved(self._now, thing.id, at.xy, at.cov))
         return events
 
 
-def _parts(known: Mapping[int, KnownWeight] | list[KnownWeight | None], total: float) -> list[float]:
+def _parts(known: Sequence[KnownWeight | None], total: float) -> list[float]:
     """Shares of a sum of loads of which only some weights are known."""
-    weights = [None if one is None else max(one.mean_g, 1.0) for one in known]  # type: ignore[union-attr]
+    weights = [None if one is None else max(one.mean_g, 1.0) for one in known]
     rest = max(total - sum(one for one in weights if one is not None), 0.05 * abs(total))
     unknown = sum(one is None for one in weights)
     shares = [rest / unknown if one is None else one for one in weights]

@@ -1,6 +1,6 @@
-"""A thing is put onto an edge first and lifted from one: its load goes beside the straight line, and is still one thing.
+"""A thing is put onto an edge first, and lifted from one: its load strays from the straight line, and is one still.
 
-What that adds to the cells is linear in how far it wanders, so that a likelihood may be averaged over it in closed form.
+What that adds to the cells is linear in how far it strays, so that a likelihood is averaged over it in closed form.
 """
 
 from __future__ import annotations
