@@ -29,6 +29,8 @@ _OVER, _NEW, _MEASURED, _LATE_MEASURED, _SLID = 0.02, 0.05, 0.05, 0.003, 1e-3
 _UNKNOWN, _MOVED, _MOVED_G = 1e-3, 0.02, 8.0
 #: The zero moves by so much per square root of an hour, a resting level is never better known than this, g.
 _WALK_G, _FLOOR_G = 6.0, 1.0
+#: A board that is shaken swings by so much.
+_SHAKEN_G = 6.0
 #: Up to so many stays may be over at once.
 _MOST_OVER, _MANY = 3, 10
 #: What nothing explains for so long is a zero that has moved.
@@ -46,6 +48,8 @@ class Balance:
         self._off_since: float | None = None
         #: When the sum was right last.
         self.right_at = -math.inf
+        #: Something shakes the board, so that its level may swing.
+        self.shaking = False
         self._whole_limit = chi_square_limit(settings.change_sd, shelf.geometry.count) / settings.change_sd**2
 
     def removed(self, things: Sequence[Thing], now: float, *, tight: bool = True) -> None:
@@ -84,7 +88,7 @@ class Balance:
         self._walk(now)
         before = self.zero + self._shelf.total()
         none = np.zeros((0, len(level)))
-        both = variance + self.variance + _FLOOR_G**2
+        both = variance + self.variance + _FLOOR_G**2 + (_SHAKEN_G**2 if self.shaking else 0.0)
         return Step(onset, settled, now, level - before, both, before, self.variance, none, none, 1.0)
 
     def _walk(self, now: float) -> None:

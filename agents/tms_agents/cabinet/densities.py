@@ -25,14 +25,27 @@ def normal(value: Array, variance: Array) -> float:
 class PutDensity:
     """Log density of a load vector (k,), per g^k, if it is that of one thing somewhere on the board."""
 
-    def __init__(self, geometry: Geometry, least_g: float, weights: Sequence[KnownWeight] = ()) -> None:
+    def __init__(
+        self,
+        geometry: Geometry,
+        least_g: float,
+        weights: Sequence[KnownWeight] = (),
+        *,
+        trust: float = 0.5,
+        clear: float = 4.0,
+    ) -> None:
+        """``trust``: how probable it is that the thing is one of those with the known ``weights``.
+
+        A load less than ``clear`` of its standard deviations is nobody's.
+        """
         self.geometry, self._least_g, self._weights = geometry, least_g, weights
+        self._trust, self._clear = trust, clear
         self._area = geometry.width * geometry.depth
         self._jacobian = float(np.linalg.slogdet(np.vstack([geometry.moments, geometry.twist]))[1])
 
     def __call__(self, load: Array, variance: Array) -> float:
         weight, sd2 = float(load.sum()), float(variance.sum())
-        if weight < max(4.0 * math.sqrt(sd2), self._least_g):
+        if weight < max(self._clear * math.sqrt(sd2), self._least_g):
             return -math.inf
         place = off_board(load, variance, self.geometry) - math.log(self._area) - 2 * math.log(weight)
         return self._weight(weight, sd2) + place + self._twist(load, variance, weight) + self._jacobian
@@ -83,7 +96,7 @@ class PutDensity:
             / math.sqrt(2 * math.pi * (item.sd_g**2 + sd2))
             for item in self._weights
         )
-        return math.log(0.5 * math.exp(broad) + 0.5 * peaks / len(self._weights))
+        return math.log((1 - self._trust) * math.exp(broad) + self._trust * peaks / len(self._weights))
 
     def _twist(self, load: Array, variance: Array, weight: float) -> float:
         twist = self.geometry.twist

@@ -15,24 +15,29 @@ from tms_agents.cabinet.bookkeeping import Bookkeeper
 from tms_agents.cabinet.events import CabinetEvent, Stay
 from tms_agents.cabinet.fusion import Evidence, Explanation, explain
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
+from tms_agents.cabinet.hindsight import Hindsight
 from tms_agents.cabinet.naming import Namer
 from tms_agents.cabinet.noise import Noise
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step, StepDetector
+from tms_agents.cabinet.wobble import Wobble
 
 #: An unclear level that the load left sooner than this was one in passing.
 _PASSING_S = 0.8
-#: How long the load must rest before its sum is believed, how sure another explanation must be, and how long a lifted
+#: How long the load must rest before its sum is believed, and before what it says is corrected (everything since the
+#: last rest has been looked at by then), how sure another explanation must be, and how long a lifted
 #: thing's tag may stay in view in the hand.
-_BALANCE_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 0.9, 0.8
+_BALANCE_S, _CORRECT_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 4.0, 0.9, 0.8
 #: Rounds that must have told of a tag before its thing is one of several that changed at once.
 _HEARD = 2
 #: Several at once are believed only at a level that is no pause between them.
 _SEVERAL_S = 0.7
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
 _JUMP_G = 6.0
+#: A block so near the resting level tells how much it wobbles.
+_NEAR_G = 50.0
 
 
 class CabinetEstimator:
@@ -53,6 +58,7 @@ class CabinetEstimator:
         self._zones = dict(zones)
         self._blocks = Blocks(geometry.count, self._settings)
         self._noise = Noise(geometry.count, self._settings)
+        self._wobble = Wobble(geometry.count)
         self._detector = StepDetector(geometry.count, self._settings)
         self._shelf = Shelf(geometry)
         self._presence = Presence(self._settings)
@@ -66,6 +72,7 @@ class CabinetEstimator:
         self._book = Bookkeeper(self._shelf, self._settings)
         self._balance = Balance(self._shelf, self._settings)
         self._namer = Namer(self._shelf, self._presence, self._zones, self._known, self._settings)
+        self._hindsight = Hindsight(self._shelf, self._presence, self._namer, self._settings)
 
     # --- input
 
@@ -81,15 +88,24 @@ class CabinetEstimator:
                 self._interrupted = t
                 self._detector.interrupt()
                 self._noise.interrupt()
+                self._hindsight.interrupt()
             return []
         if done is None:
             return []
         block, samples = done
         self._noise.learn(block, samples)
+        level = self._detector.level
+        near = level.known and float(np.abs(block.mean - level.mean).max()) < _NEAR_G
+        self._wobble.hear(float(block.variance.mean()) * block.n, block.end - block.start)
+        self._wobble.push(t, block.mean, block.variance, near)
+        block.variance = block.variance + self._wobble.variance
         if self._interrupted is not None:
             self._drifted(block.start - self._interrupted)
             self._interrupted = None
+        self._balance.shaking = self._wobble.shaking
         step = self._detector.push(block)
+        if not self._detector.resting:
+            self._hindsight.changing(block, self._detector.level)
         if step is not None:
             return self._explain(step)
         if self._detector.resting and t - self._looked > 0.5:
@@ -147,8 +163,16 @@ class CabinetEstimator:
         events = self._book.rest(t, level, variance)
         if seconds < _BALANCE_S:
             return events
+        if self._settings.knows_places:
+            rested, shaking = self._rested, self._wobble.shaking
+            revised = self._hindsight.rest(t, level, variance, seconds, rested, shaking=shaking)
+            if revised:
+                self._book.settling = None
+                events += revised
         step = self._balance.rest(t, level, variance)
-        return events if step is None else events + self._correct(step)
+        if step is not None and seconds >= _CORRECT_S:
+            events += self._correct(step)
+        return events
 
     def _correct(self, step: Step) -> list[CabinetEvent]:
         """The sum of the stays is not what the cells show: what is more probable?"""
@@ -174,7 +198,7 @@ class CabinetEstimator:
         whole = self._whole(step)
         evidence = self._evidence(step)
         if whole is not None:
-            evidence = replace(evidence, left=(whole.change, whole.variance))
+            evidence = replace(evidence, left=(whole.change, whole.variance), shaking=self._wobble.shaking)
         explanations = explain(step, self._shelf, evidence, self._settings)
         if steady > self._settings.patience_s and waited > self._settings.stubborn_s:
             # No hand presses for so long.
@@ -265,8 +289,6 @@ class CabinetEstimator:
         self._rested = step.settled
         self._book.newest = []
         events = self._book.apply(step, explanation)
-        if self._book.settling is not None and self._book.settling.placed is not None:
-            self._detector.forget_before(self._book.settling.placed.ended)
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
         return events + self._namer.update(step.now, resting=self._detector.resting)

@@ -47,12 +47,18 @@ _TWO_PUT, _TWO_PUT_TAGS = 0.02, 0.2
 _LOOSE_TRIED = 6
 #: How often a slid thing is steady while a hand still presses or pulls it.
 _PRESSED_SLIDE = 0.03
+#: A board that is shaken may swing by so much and so often; what looks like a slide is rarely one then.
+_SWING_G, _SWINGS, _STEADIER = 9.0, 0.3, 0.2
 #: How often a thing was measured badly: pressed, or under a leaning arm.
-_LOOSE = 0.01
+_LOOSE = 0.03
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
 _HAND_M, _CROWDED_M = 0.015, 0.03
 #: Two things put at once stand so far apart at least; nearer, it was one that was tilted (log-odds of the price).
 _ONE_M, _TWO_M, _TILTED = 0.06, 0.085, -8.0
+#: How far the centre of a thing that has just come shifts when it is set upright.
+_UPRIGHT_M = 0.003
+#: ... and what is left where a thing went is it (log-odds).
+_REMNANT = -4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,6 +107,8 @@ class Evidence:
     doubts: Sequence[Doubt] = ()
     #: What the load is beside zeros and stays after the step, (k,) g, and its variance: None while not known.
     left: tuple[Array, Array] | None = None
+    #: Something shakes the board, so that its level may swing.
+    shaking: bool = False
 
 
 def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings) -> list[Explanation]:
@@ -121,6 +129,9 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         # It makes good what was wrong before, so that everything fits now.
         settled = math.log(_PRIOR["settled"]) + normal(*evidence.left)
         found.append(Explanation("settled", settled))
+    if evidence.shaking:
+        swing = math.log(_PRIOR["settled"] * _SWINGS) + normal(change, variance + _SWING_G**2)
+        found.append(Explanation("settled", swing))
     each = math.log(1.0 / max(len(things), 1))
     noises = [thing.at(step.now, settings.creep_per_hour) for thing in things]
     taken = [evidence.taken(thing) for thing in things]
@@ -139,13 +150,13 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             found.append(Explanation("adjust", score, removed=(thing,), thing=newest, load=whole))
         after = put(left, both)
         if after > -math.inf:
-            prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load)
+            prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load, geometry)
             # A thing half lifted or tilted looks like a lighter one in its place.
-            crowd = crowded(left)
+            crowd = crowded(left) + _remnant(left, thing, geometry)
             found.append(Explanation("swap", prior + after + crowd, removed=(thing,), load=left))
             if settings.knows_places and abs(step.weight_g) < 0.5 * float(thing.load.sum()):
-                prior = math.log(_PRIOR["slide"]) + each - max(tag, 0.0)
-                prior += max(path_odds(step, -thing.load, same_thing=True), 0.0)
+                prior = math.log(_PRIOR["slide"] * (_STEADIER if evidence.shaking else 1.0)) + each - max(tag, 0.0)
+                prior += max(path_odds(step, -thing.load, geometry, same_thing=True), 0.0)
                 still, pressed = put.slid(change, left, both)
                 found.append(Explanation("slide", prior + still, thing=thing, load=left))
                 found.append(Explanation("press", prior + math.log(_PRESSED_SLIDE) + pressed, thing=thing))
@@ -155,7 +166,10 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
                 found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
             if settings.knows_places and thing is evidence.settling and evidence.settling_share > 0.01:
                 prior = math.log(_PRIOR["adjust"] * evidence.settling_share)
-                found.append(Explanation("adjust", prior + put.same_place(thing, step), thing=thing, load=left))
+                # The last of it may also set it upright: its whole load shifts a little.
+                upright = _UPRIGHT_M * float(thing.load.sum()) / max(abs(step.weight_g), 1.0)
+                here = put.same_place(thing, step, math.hypot(0.005, upright))
+                found.append(Explanation("adjust", prior + here, thing=thing, load=left))
     found += _taken_and_pressed(step, found, things, put)
     for doubt in evidence.doubts:
         for which, sign in ((doubt.thing, -1.0), (doubt.other, 1.0)):
@@ -165,7 +179,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             score = math.log(_PRIOR["take"]) + each + evidence.taken(which) + doubt.odds
             score += normal(change + which.load + sign * doubt.change, noise)
             found.append(Explanation("take", score, removed=(which,), undo=doubt))
-    found += _two_taken(step, things, noises, taken)
+    found += _two_taken(step, things, noises, taken, geometry)
     if step.weight_g > 2 * settings.min_weight_g:
         found += _two_put(step, put, evidence.loose)
     return _normalised(found)
@@ -186,6 +200,14 @@ def _crowded(load: Array, shelf: Shelf, gone: Thing | None = None) -> float:
     return math.log(1.0 - 0.95 * math.exp(-0.5 * (min(near) / _CROWDED_M) ** 2)) if near else 0.0
 
 
+def _remnant(load: Array, gone: Thing, geometry: Geometry) -> float:
+    """What is a small part of the thing that went, and where that was, is hardly another thing."""
+    if float(load.sum()) > 0.3 * float(gone.load.sum()):
+        return 0.0
+    apart = math.dist(centre_free(load, geometry), gone.centre(geometry).xy)
+    return _REMNANT * math.exp(-0.5 * (apart / _ONE_M) ** 2)
+
+
 def _taken_and_pressed(
     step: Step, found: Sequence[Explanation], things: Sequence[Thing], put: PutDensity
 ) -> list[Explanation]:
@@ -198,12 +220,14 @@ def _taken_and_pressed(
         for thing in things:
             if thing not in swap.removed:
                 prior = math.log(_PRIOR["take"] * _PRIOR["press"]) - 2 * math.log(len(things))
-                prior += path_odds(step, step.change - swap.load)
+                prior += path_odds(step, step.change - swap.load, put.geometry)
                 pressed.append(Explanation("press", prior + put.same_place(thing, left, _HAND_M), thing=thing))
     return pressed
 
 
-def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list[float]) -> list[Explanation]:
+def _two_taken(
+    step: Step, things: list[Thing], noises: list[Array], taken: list[float], geometry: Geometry
+) -> list[Explanation]:
     if len(things) < 2 or step.weight_g > 0:
         return []
     loads, spreads, tags = np.array([t.load for t in things]), np.array(noises), np.array(taken)
@@ -214,7 +238,7 @@ def _two_taken(step: Step, things: list[Thing], noises: list[Array], taken: list
     scores += math.log(_TWO_TAKEN / len(first))
     best = np.argsort(scores)[::-1][:8]
     for i in best:
-        scores[i] += path_odds(step, -loads[first[i]])
+        scores[i] += path_odds(step, -loads[first[i]], geometry)
     return [Explanation("take", float(scores[i]), removed=(things[first[i]], things[second[i]])) for i in best]
 
 
@@ -222,7 +246,7 @@ def _two_put(step: Step, put: PutDensity, loose: Mapping[str, KnownWeight | None
     """Two things at once: told apart by the path of the load, or only known as a sum of two known weights."""
     prior = math.log(_TWO_PUT_TAGS if len(loose) >= 2 else _TWO_PUT)
     found = []
-    parts = split(step)
+    parts = split(step, put.geometry)
     if parts is not None:
         volume = 0.5 * float(np.log(2 * math.pi * parts.variance).sum())
         score = (

@@ -36,6 +36,8 @@ class Namer:
         #: When a tag's last stay ended: it cannot be at a stay that began before.
         self._lifted: dict[str, float] = {}
         self._told: dict[tuple[str, str], float] = {}
+        #: Weights unlike what was known, seen once.
+        self._odd: dict[str, KnownWeight] = {}
 
     def weight(self, tag: str) -> KnownWeight | None:
         """What the object weighed when it was here last, else what the database says."""
@@ -110,12 +112,24 @@ class Namer:
         """A thing was lifted: remember what it weighed."""
         if thing.tag is not None:
             self._lifted[thing.tag] = now
+            if self._is_odd(thing.tag, KnownWeight(weight_g, sd_g)):
+                return
             self.learned.pop(thing.tag, None)
             self.learned[thing.tag] = KnownWeight(weight_g, sd_g + 0.005 * abs(weight_g))
             while len(self.learned) > _LEARNED_KEPT:
                 del self.learned[next(iter(self.learned))]
             while len(self._lifted) > _LEARNED_KEPT:
                 del self._lifted[next(iter(self._lifted))]
+
+    def _is_odd(self, tag: str, new: KnownWeight) -> bool:
+        """Whether a weight is unlike what is known, for the first time: it may be another thing's."""
+        known, odd = self.weight(tag), self._odd.pop(tag, None)
+        if known is None or _like(new, known) or (odd is not None and _like(new, odd)):
+            return False
+        self._odd[tag] = new
+        while len(self._odd) > _LEARNED_KEPT:
+            del self._odd[next(iter(self._odd))]
+        return True
 
     def _zone_reads(self, now: float, loose: Mapping[str, Mapping[str, Sighting]]) -> list[CabinetEvent]:
         events: list[CabinetEvent] = []
@@ -132,3 +146,7 @@ class Namer:
             if not self._presence.is_present(tag) and not any(z == zone for z, _ in self._told):
                 events.append(ZoneRead(now, zone, None))
         return events
+
+
+def _like(one: KnownWeight, other: KnownWeight) -> bool:
+    return abs(one.mean_g - other.mean_g) < 4 * math.hypot(one.sd_g, other.sd_g) + 0.02 * other.mean_g + 1.0

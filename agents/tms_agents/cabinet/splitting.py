@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.geometry import Array, Geometry
 from tms_agents.cabinet.steps import Step
+from tms_agents.cabinet.wandering import misfit, pulls_of
 
 _LEAST_BLOCKS = 4
 #: Two changes within less than a block or two are hardly possible.
@@ -21,7 +22,7 @@ _NO_PATH = -6.0
 #: Scale beyond which a misfit counts less.
 _MOST_ODDS = 12.0
 #: How far aside a hand presses, as a share of what it presses.
-_HAND = 0.06
+_HAND = 0.03
 
 
 class Split(NamedTuple):
@@ -36,7 +37,7 @@ class Split(NamedTuple):
     gain: float
 
 
-def split(step: Step) -> Split | None:
+def split(step: Step, geometry: Geometry) -> Split | None:
     """The step as the sum of two; None where its path is too short to tell."""
     path = step.path
     count, cells = path.shape
@@ -57,7 +58,10 @@ def split(step: Step) -> Split | None:
     cost = misfit_early[:, None] + misfit_late[None, :] + (cells - 0.5) * between
     i, j = np.unravel_index(np.where(between >= 0, cost, np.inf).argmin(), cost.shape)
     one = whole / np.linalg.norm(whole)
-    single = float((so_far**2).sum() - ((so_far @ one) ** 2).sum())
+    aside = so_far - (so_far @ one)[:, None] * one
+    pulls = weight[:, :, None] * pulls_of(path, geometry) / sd[:, None]
+    pulls = pulls - np.einsum("tkb,k->tb", pulls, one)[:, None, :] * one[:, None]
+    single = misfit(aside, pulls)
     directions = np.stack([early_vectors[i, :, -1], late_vectors[j, :, -1]])
     if abs(float(directions[0] @ directions[1])) > 0.999:
         return None
@@ -67,13 +71,13 @@ def split(step: Step) -> Split | None:
     errors = scale**2 / np.maximum([early_values[i, -1], late_values[j, -1]], 1.0)
     spread = 1.0 / max(1e-3, 1.0 - float(directions[0] @ directions[1]) ** 2)
     variance = sd**2 * float(errors.sum()) * spread + step.variance
-    misfit = float(cost[i, j]) + float((left**2 / (variance / sd**2)).sum())
+    two = float(cost[i, j]) + float((left**2 / (variance / sd**2)).sum())
     first = scale[0] * directions[0] * sd
     off = scale[0] * (directions[0] - one * float(one @ directions[0]))
-    return Split(first, step.change - first, variance, _dampened(0.5 * (single - misfit)) - _freedom(off, count))
+    return Split(first, step.change - first, variance, _dampened(0.5 * (single - two)) - _freedom(off, count))
 
 
-def path_odds(step: Step, one: Array, *, same_thing: bool = False) -> float:
+def path_odds(step: Step, one: Array, geometry: Geometry, *, same_thing: bool = False) -> float:
     """Log-likelihood ratio that the load went by two changes, ``one`` (k,) and the rest of the step, instead of by one.
 
     A single change goes straight. Two changes at once leave the straight line, unless they keep exactly the same time.
@@ -93,7 +97,9 @@ def path_odds(step: Step, one: Array, *, same_thing: bool = False) -> float:
     aside = path @ (off / size)
     # A hand does not press exactly on the centre of the thing that it moves.
     unit = 1.0 + (_HAND * np.linalg.norm(path, axis=1)) ** 2
-    gain = 0.5 * float((aside**2 / unit).sum() - count)
+    pulls = np.einsum("tkb,k->tb", pulls_of(step.path, geometry) / sd[:, None], off / size)
+    root = np.sqrt(unit)
+    gain = 0.5 * (misfit((aside / root)[:, None], (pulls / root[:, None])[:, None, :]) - count)
     return _dampened(gain) if same_thing else _dampened(gain) - _freedom(off / math.sqrt(float(unit.mean())), count)
 
 

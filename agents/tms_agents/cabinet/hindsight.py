@@ -1,0 +1,123 @@
+"""Looks back at what was told since the board last rested, and puts it right where everything says otherwise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from tms_agents.cabinet.baseline import Level
+from tms_agents.cabinet.blocks import Block
+from tms_agents.cabinet.episodes import Episode, Outcome, outcomes
+from tms_agents.cabinet.events import CabinetEvent
+from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.naming import Namer
+from tms_agents.cabinet.plans import Known
+from tms_agents.cabinet.presence import Presence
+from tms_agents.cabinet.revising import Revision, current, order
+from tms_agents.cabinet.settings import EstimatorSettings
+from tms_agents.cabinet.stays import Shelf, Thing
+
+#: An episode is looked at when the board has rested so long; the next one begins after so long a rest, and after so
+#: long a one nothing more is asked about the last.
+_LOOK_S, _RESTED_S, _CLOSED_S = 1.5, 2.5, 4.0
+#: Another outcome must be so sure, and what was told so improbable.
+_SURE, _DOUBT = 0.9, 0.05
+#: More often than that an episode is not put right: something else speaks against it.
+_MOST_REVISIONS = 2
+#: How long a lifted thing's tag may stay in view in the hand.
+_IN_HAND_S = 0.8
+#: Rounds go wrong in ways of their own: no tag's evidence counts more than this.
+_MOST_ODDS = 12.0
+
+
+class Hindsight:
+    """Feed it every block while the load changes, and ask it now and then while it rests."""
+
+    def __init__(self, shelf: Shelf, presence: Presence, namer: Namer, settings: EstimatorSettings) -> None:
+        self._shelf, self._presence, self._namer, self._settings = shelf, presence, namer, settings
+        self._before: list[Thing] | None = None
+        self._episode: Episode | None = None
+        self._uncertain = False
+        self._revisions = 0
+
+    def changing(self, block: Block, level: Level) -> None:
+        """The load is not at rest; ``level`` is where it last rested."""
+        if self._before is not None:
+            self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start)
+            self._before, self._uncertain, self._revisions = None, False, 0
+        if self._episode is not None:
+            self._episode.add(block)
+
+    def interrupt(self) -> None:
+        """Samples are missing, and the zeros may have jumped meanwhile."""
+        self._uncertain = True
+
+    def rest(
+        self, t: float, level: Array, variance: Array, seconds: float, rested: float, *, shaking: bool
+    ) -> list[CabinetEvent]:
+        """The load rests at ``level``, (k,) g, for some ``seconds``; the last change ended at ``rested``."""
+        events: list[CabinetEvent] = []
+        if self._episode is not None and seconds >= _LOOK_S and self._revisions < _MOST_REVISIONS:
+            events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
+        if seconds >= _RESTED_S:
+            self._before = [
+                replace(thing, load=thing.load.copy(), variance=thing.variance.copy())
+                for thing in self._shelf.things.values()
+            ]
+        if seconds >= _CLOSED_S:
+            self._episode = None
+        return events
+
+    def _revise(
+        self, episode: Episode, t: float, level: Array, variance: Array, rested: float, shaking: bool
+    ) -> list[CabinetEvent]:
+        things = self._shelf.things
+        for thing in episode.things:
+            if thing.id in things:
+                thing.tag = things[thing.id].tag
+        found = outcomes(
+            episode,
+            t,
+            level,
+            variance,
+            Known(
+                {*self._namer.loose(), *(thing.tag for thing in things.values() if thing.tag is not None)},
+                lambda tag: self._odds(tag, rested + _IN_HAND_S),
+                self._namer.weight,
+                shaking,
+            ),
+            self._shelf.geometry,
+            self._settings.creep_per_hour,
+        )
+        told, best = current(episode, self._shelf), found[0]
+        if not best.known or best.score < _SURE or _same(best, told):
+            return []
+        if sum(one.score for one in found if one.known and _same(one, told)) > _DOUBT:
+            return []
+        self._revisions += 1
+        return Revision(
+            self._shelf,
+            episode,
+            best,
+            t,
+            pin=self._namer.pin,
+            left=lambda thing: self._left(thing, t),
+            weight=self._namer.weight,
+        ).events()
+
+    def _odds(self, tag: str, since: float) -> tuple[float, float]:
+        hit, false = self._settings.read_probability, self._settings.false_read_probability
+        read, missed = self._presence.looks(tag, since)
+        there = read * math.log(hit) + missed * math.log(1 - hit)
+        gone = read * math.log(false) + missed * math.log(1 - false)
+        return float(np.logaddexp(there, -_MOST_ODDS)), float(np.logaddexp(gone, -_MOST_ODDS))
+
+    def _left(self, thing: Thing, t: float) -> None:
+        at = thing.centre(self._shelf.geometry)
+        self._namer.left(thing, t, at.weight_g, at.weight_sd_g)
+
+
+def _same(outcome: Outcome, told: tuple[frozenset[int], tuple[str | None, ...]]) -> bool:
+    return (outcome.gone, order(outcome.new)) == told

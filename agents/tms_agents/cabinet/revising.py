@@ -1,0 +1,186 @@
+"""Make the shelf what an outcome says, with as few events as possible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from tms_agents.cabinet.episodes import Episode, Outcome
+from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
+from tms_agents.cabinet.geometry import Array, KnownWeight
+from tms_agents.cabinet.stays import Shelf, Thing
+
+#: A stay whose load changed by so much was slid; less is only known better.
+_SLID_G, _SLID_SHARE = 8.0, 0.05
+#: A place that is so much nearer to the truth is told.
+_MOVED_M = 0.03
+
+
+def current(episode: Episode, shelf: Shelf) -> tuple[frozenset[int], tuple[str | None, ...]]:
+    """What the shelf says of the episode, as ``gone`` and ``new`` of an outcome."""
+    before = {thing.id: thing for thing in episode.things}
+    gone = {i for i in before if i not in shelf.things}
+    new = [thing.tag for i, thing in shelf.things.items() if i not in before]
+    for i in before.keys() & shelf.things.keys():
+        if _slid(before[i], shelf.things[i]):
+            gone.add(i)
+            new.append(shelf.things[i].tag)
+    return frozenset(gone), order(new)
+
+
+def order(tags: Iterable[str | None]) -> tuple[str | None, ...]:
+    """Tags in one order, those that are None last."""
+    return tuple(sorted(tags, key=lambda tag: (tag is None, tag or "")))
+
+
+def _slid(before: Thing, now: Thing) -> bool:
+    far = np.abs(now.load - before.load).max()
+    return bool(far > _SLID_G + _SLID_SHARE * abs(float(before.load.sum())) + 3 * np.sqrt(before.variance.max()))
+
+
+class Revision:
+    """One outcome on one shelf. ``pin`` and ``left`` tell the keeper of tags what happened."""
+
+    def __init__(
+        self,
+        shelf: Shelf,
+        episode: Episode,
+        outcome: Outcome,
+        now: float,
+        *,
+        pin: Callable[[float, Thing, str], CabinetEvent],
+        left: Callable[[Thing], None],
+        weight: Callable[[str], KnownWeight | None],
+    ) -> None:
+        self._shelf, self._episode, self._outcome, self._now = shelf, episode, outcome, now
+        self._pin, self._left, self._weight = pin, left, weight
+
+    def events(self) -> list[CabinetEvent]:
+        """Change the shelf and tell of it: first what is not there, then what is."""
+        self._told_apart()
+        before = {thing.id: thing for thing in self._episode.things}
+        wanted = list(self._outcome.new)
+        events: list[CabinetEvent] = []
+        stays: list[Thing] = []
+        back: list[Thing] = []
+        for i, old in before.items():
+            now = self._shelf.things.get(i)
+            if now is None and i not in self._outcome.gone:
+                back.append(old)
+            elif now is not None and i in self._outcome.gone:
+                if now.tag in wanted:
+                    # Lifted and put down so quickly that nobody saw the board without it, or slid.
+                    wanted.remove(now.tag)
+                    stays.append(now)
+                else:
+                    events.append(self._remove(now))
+            elif now is not None and _slid(old, now):
+                now.load, now.variance = old.load.copy(), old.variance.copy()
+                now.forget_place()
+                at = now.centre(self._shelf.geometry)
+                now.told = at.xy
+                events.append(Moved(self._now, now.id, at.xy, at.cov))
+        fresh = [thing for i, thing in self._shelf.things.items() if i not in before]
+        for thing in list(fresh):
+            if thing.tag in wanted:
+                wanted.remove(thing.tag)
+                stays.append(thing)
+                fresh.remove(thing)
+        later: list[CabinetEvent] = []
+        for thing in list(fresh):
+            if thing.tag is None and wanted:
+                tag = wanted.pop(0)
+                if tag is not None:
+                    later.append(self._pin(self._now, thing, tag))
+                stays.append(thing)
+                fresh.remove(thing)
+        events += [self._remove(thing) for thing in fresh]
+        for old in back:
+            events += self._put(old.load, old.variance, old.tag, old.since)
+            # A stay is never used again: from now on this is the one that stood there before.
+            old.id = self._shelf.next_id - 1
+        return events + self._share(stays, wanted) + later
+
+    def _told_apart(self) -> None:
+        """One of several that came together has gone: what it weighed less than was thought, the others weigh more."""
+        gone, load = self._outcome.gone, self._outcome.load
+        others = [old for old in self._episode.things if old.joint & gone and old.id not in gone]
+        if self._outcome.new or not others:
+            return
+        for old in others:
+            old.load, old.joint = old.load + load / len(others), old.joint - gone
+            if len(others) == 1:
+                old.variance = 2 * self._outcome.variance
+            now = self._shelf.things.get(old.id)
+            if now is not None:
+                now.load, now.variance, now.joint = old.load.copy(), old.variance.copy(), old.joint
+
+    def _remove(self, thing: Thing) -> Vanished:
+        self._left(thing)
+        at = thing.centre(self._shelf.geometry)
+        del self._shelf.things[thing.id]
+        return Vanished(self._now, thing.id, at.weight_g, at.weight_sd_g)
+
+    def _share(self, stays: list[Thing], wanted: list[str | None]) -> list[CabinetEvent]:
+        """Give the new things their loads."""
+        load, variance = self._outcome.load, self._outcome.variance
+        if len(stays) + len(wanted) == 1:
+            if wanted:
+                return self._put(load, variance, wanted[0], self._episode.onset)
+            stays[0].load, stays[0].variance, stays[0].joint = load.copy(), variance.copy(), frozenset()
+            stays[0].forget_place()
+            return self._tell(stays)
+        rest = load - sum((thing.load for thing in stays), np.zeros_like(load))
+        if len(wanted) == 1:
+            least = min(5.0, 0.2 * float(load.sum()))
+            if float(rest.sum()) > least:
+                errors = variance + sum((thing.variance for thing in stays), np.zeros_like(load))
+                return self._put(rest, errors, wanted[0], self._episode.onset)
+        if not wanted:
+            total = sum((thing.variance for thing in stays), np.zeros_like(load))
+            for thing in stays:
+                thing.load = thing.load + rest * thing.variance / np.maximum(total, 1e-9)
+            return self._tell(stays)
+        events = [self._remove(thing) for thing in stays]
+        tags = [*(thing.tag for thing in stays), *wanted]
+        known = [None if tag is None else self._weight(tag) for tag in tags]
+        parts = _parts(known, float(load.sum()))
+        placed: list[Thing] = []
+        told: list[CabinetEvent] = list(events)
+        for tag, part in zip(tags, parts, strict=True):
+            guess = (0.35 * part * float(load.sum())) ** 2 + np.zeros_like(load)
+            told += self._put(part * load, guess, tag, self._episode.onset)
+            placed.append(self._shelf.things[self._shelf.next_id - 1])
+        for thing in placed:
+            thing.joint = frozenset(other.id for other in placed if other is not thing)
+        ids = tuple(thing.id for thing in placed)
+        return [*told, LoadChanged(self._now, ids, float(load.sum()), float(np.sqrt(variance.sum())))]
+
+    def _put(self, load: Array, variance: Array, tag: str | None, since: float) -> list[CabinetEvent]:
+        thing = self._shelf.put(load.copy(), variance.copy(), since=since, onset=since)
+        events: list[CabinetEvent] = []
+        at = thing.centre(self._shelf.geometry)
+        thing.told = at.xy
+        events.append(Appeared(self._now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
+        if tag is not None:
+            events.append(self._pin(self._now, thing, tag))
+        return events
+
+    def _tell(self, stays: list[Thing]) -> list[CabinetEvent]:
+        events: list[CabinetEvent] = []
+        for thing in stays:
+            at = thing.centre(self._shelf.geometry)
+            if float(np.hypot(*np.subtract(at.xy, thing.told))) > _MOVED_M:
+                thing.told = at.xy
+                events.append(Moved(self._now, thing.id, at.xy, at.cov))
+        return events
+
+
+def _parts(known: Sequence[KnownWeight | None], total: float) -> list[float]:
+    """Shares of a sum of loads of which only some weights are known."""
+    weights = [None if one is None else max(one.mean_g, 1.0) for one in known]
+    rest = max(total - sum(one for one in weights if one is not None), 0.05 * abs(total))
+    unknown = sum(one is None for one in weights)
+    shares = [rest / unknown if one is None else one for one in weights]
+    return [share / sum(shares) for share in shares]
