@@ -61,7 +61,8 @@ def split(step: Step, geometry: Geometry) -> Split | None:
     aside = so_far - (so_far @ one)[:, None] * one
     pulls = weight[:, :, None] * pulls_of(path, geometry) / sd[:, None]
     pulls = pulls - np.einsum("tkb,k->tb", pulls, one)[:, None, :] * one[:, None]
-    single = misfit(aside, pulls)
+    # As straight as can be, or astray: whichever fits better.
+    single = min(float((aside**2).sum()), misfit(aside, pulls))
     directions = np.stack([early_vectors[i, :, -1], late_vectors[j, :, -1]])
     if abs(float(directions[0] @ directions[1])) > 0.999:
         return None
@@ -99,7 +100,8 @@ def path_odds(step: Step, one: Array, geometry: Geometry, *, same_thing: bool = 
     unit = 1.0 + (_HAND * np.linalg.norm(path, axis=1)) ** 2
     pulls = np.einsum("tkb,k->tb", pulls_of(step.path, geometry) / sd[:, None], off / size)
     root = np.sqrt(unit)
-    gain = 0.5 * (misfit((aside / root)[:, None], (pulls / root[:, None])[:, None, :]) - count)
+    stray = misfit((aside / root)[:, None], (pulls / root[:, None])[:, None, :])
+    gain = 0.5 * (min(float((aside**2 / unit).sum()), stray) - count)
     return _dampened(gain) if same_thing else _dampened(gain) - _freedom(off / math.sqrt(float(unit.mean())), count)
 
 

@@ -116,6 +116,8 @@ class Pairing:
         """A tag given by hand, or by a reader that says each tag once: nothing to wait for."""
         found = self.tick(t)
         self._forget_other(tag)
+        for other, one in self._seen.items():  # what lies at the reader is not what is meant now
+            one.told = one.told or other != tag
         return [*found, *self._present(t, tag)]
 
     def tick(self, t: float) -> list[Outcome]:

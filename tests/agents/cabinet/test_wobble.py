@@ -69,8 +69,8 @@ def put_down(tilt_m: float, blocks: int = 40) -> Step:
 
 def test_a_thing_that_is_set_upright_is_one_thing() -> None:
     tilted = split(put_down(0.012), GEOMETRY)
-    assert tilted is None or tilted.gain < 3.0
-    assert path_odds(put_down(0.012), 700 * share(0.25, 0.15), GEOMETRY) < 3.0
+    assert tilted is None or tilted.gain < 8.0  # two things: far more, as below
+    assert path_odds(put_down(0.012), 700 * share(0.25, 0.15), GEOMETRY) < 0.0
 
 
 def test_two_things_one_after_the_other_are_two() -> None:
@@ -81,7 +81,7 @@ def test_two_things_one_after_the_other_are_two() -> None:
     none = np.zeros(4)
     step = Step(0.0, 3.2, 3.6, first + second, np.full(4, 4.0), none, none + 1.0, path, np.full((40, 4), 16.0), 1.0)
     found = split(step, GEOMETRY)
-    assert found is not None and found.gain > 10.0
+    assert found is not None and found.gain > 16.0
     assert abs(found.first.sum() - 700) < 70
 
 
