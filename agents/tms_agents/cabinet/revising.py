@@ -142,20 +142,25 @@ class Revision:
             for thing in stays:
                 thing.load = thing.load + rest * thing.variance / np.maximum(total, 1e-9)
             return self._tell(stays)
-        events = [self._remove(thing) for thing in stays]
+        return self._only_the_sum(stays, wanted)
+
+    def _only_the_sum(self, stays: list[Thing], wanted: list[str | None]) -> list[CabinetEvent]:
+        """Nobody can tell what the old and the new ones weigh and where they stand; known weights help."""
+        load, events = self._outcome.load, list[CabinetEvent]()
         tags = [*(thing.tag for thing in stays), *wanted]
-        known = [None if tag is None else self._weight(tag) for tag in tags]
-        parts = _parts(known, float(load.sum()))
-        placed: list[Thing] = []
-        told: list[CabinetEvent] = list(events)
-        for tag, part in zip(tags, parts, strict=True):
-            guess = (0.35 * part * float(load.sum())) ** 2 + np.zeros_like(load)
-            told += self._put(part * load, guess, tag, self._episode.onset)
-            placed.append(self._shelf.things[self._shelf.next_id - 1])
-        for thing in placed:
-            thing.joint = frozenset(other.id for other in placed if other is not thing)
-        ids = tuple(thing.id for thing in placed)
-        return [*told, LoadChanged(self._now, ids, float(load.sum()), float(np.sqrt(variance.sum())))]
+        parts = _parts([None if tag is None else self._weight(tag) for tag in tags], float(load.sum()))
+        guesses = [(part * load, (0.35 * part * float(load.sum())) ** 2 + np.zeros_like(load)) for part in parts]
+        together = list(stays)
+        for thing, (share, guess) in zip(stays, guesses, strict=False):
+            thing.load, thing.variance = share, guess
+            thing.forget_place()
+        for tag, (share, guess) in zip(wanted, guesses[len(stays) :], strict=True):
+            events += self._put(share, guess, tag, self._episode.onset)
+            together.append(self._shelf.things[self._shelf.next_id - 1])
+        for thing in together:
+            thing.joint = frozenset(other.id for other in together if other is not thing)
+        ids, sd = tuple(thing.id for thing in together), float(np.sqrt(self._outcome.variance.sum()))
+        return [*events, LoadChanged(self._now, ids, float(load.sum()), sd)]
 
     def _put(self, load: Array, variance: Array, tag: str | None, since: float) -> list[CabinetEvent]:
         thing = self._shelf.put(load.copy(), variance.copy(), since=since, onset=since)
