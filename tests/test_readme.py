@@ -59,8 +59,20 @@ def run(arguments: list[str], url: str) -> str:
     return done.stdout
 
 
+SHARE = re.compile(r"(\d+\.\d)%")
+
+
 def assert_like(expected: str, got: str) -> None:
-    assert CHECKER.check_output(expected, got, doctest.ELLIPSIS), f"the README says\n{expected}\nbut it is\n{got}"
+    """The same words; shares within a point of each other, and those under half a point may come and go: processes
+    of their own made them, and no two runs of those are the same to the last digit."""
+    told, shares = [], []
+    for text in (expected, got):
+        lines = [line for line in text.splitlines() if not (found := SHARE.search(line)) or float(found[1]) >= 0.5]
+        told.append(SHARE.sub("%", "\n".join(lines)) + "\n")
+        shares.append([float(one) for one in SHARE.findall("\n".join(lines))])
+    same = CHECKER.check_output(told[0], told[1], doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert same, f"the README says\n{expected}\nbut it is\n{got}"
+    assert shares[1] == pytest.approx(shares[0], abs=1.0), got
 
 
 def test_the_readme_has_snippets() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,15 +11,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 #: The laboratory's own threshold for a thing.
 _SMALL_SUM_G = 20.0
+#: Fewer samples tell no level (some may be from before the interruption), unless the device is as slow as that.
+_FEW, _SLOW_S = 10, 2.0
 
 
 class Continuity:
     """Adds to every cell what makes the load after an interruption go on where it was.
 
     ``interrupted`` is called when the device stopped delivering. The first ``settle_s`` seconds after that are held
-    back and averaged. The zero is corrected where that mean differs from the level before by at most ``small_g`` in
-    every cell and 20 g in sum, or, for a device that ``zeroes_itself`` at power-on, where it shows about nothing at
-    all. Any other difference is what people did meanwhile, and is left to the estimator.
+    back. The zero is corrected where their median differs from the level before by at most ``small_g`` in every cell
+    and 20 g in sum, or, for a device that ``zeroes_itself`` at power-on, where it shows about nothing at all. Any other difference is what people did meanwhile, and is left to the estimator.
     """
 
     def __init__(
@@ -30,16 +32,24 @@ class Continuity:
             small_g,
             memory_s,
         )
-        #: Grams added to each cell, and the level of late (None: nothing is known yet), shape (k,).
+        #: Grams added to each cell, shape (k,).
         self.shift: Floats = np.zeros(cells)
-        self.level: Floats | None = None
-        self._last_t: float | None = None
+        self._level: Floats | None = None
+        self._late: deque[tuple[float, Floats]] = deque()
         self._held: list[Floats] = []
         self._held_since: float | None = None
         self._waiting = False
 
+    @property
+    def level(self) -> Floats | None:
+        """What the cells showed of late, shape (k,); None: nothing is known yet."""
+        # The median: what a cell showed while it was stuck is forgotten at once, not bit by bit.
+        return np.median([grams for _, grams in self._late], axis=0) if self._late else self._level
+
     def interrupted(self) -> None:
-        self._waiting, self._held, self._held_since, self._last_t = True, [], None, None
+        self._level = self.level
+        self._late.clear()
+        self._waiting, self._held, self._held_since = True, [], None
 
     def take(self, t: float, grams: Floats) -> Floats | None:
         """Corrected grams; None while held back. Samples with NaN pass as they are."""
@@ -49,30 +59,33 @@ class Continuity:
             if self._held_since is None:
                 self._held_since = t
             self._held.append(grams)
-            if t - self._held_since < self._settle_s and len(self._held) < 1000:
+            long = t - self._held_since
+            if long < self._settle_s or (len(self._held) < _FEW and long < _SLOW_S):
                 return None
-            self._resume(np.mean(self._held, axis=0))
+            self._resume(np.median(self._held, axis=0))
         grams = grams + self.shift
         self._follow(t, grams)
         return grams
 
     def _resume(self, now: Floats) -> None:
         self._waiting, self._held = False, []
-        if self.level is None:
+        level = self.level
+        if level is None:
             return
-        jump = now + self.shift - self.level
+        jump = now + self.shift - level
         # Zeros jump each for itself, up and down; a thing loads all cells in the same direction.
         drifted = np.abs(jump).max() <= self._small_g and abs(jump.sum()) <= _SMALL_SUM_G
         if drifted or (self._zeroes_itself and np.abs(now).max() <= self._small_g):
-            self.shift = self.level - now
+            self.shift = level - now
 
     def _follow(self, t: float, grams: Floats) -> None:
-        step = 1.0 if self._last_t is None else min(1.0, max(0.0, t - self._last_t) / self._memory_s)
-        self.level = grams.copy() if self.level is None else self.level + step * (grams - self.level)
-        self._last_t = t
+        self._late.append((t, grams))
+        while t - self._late[0][0] > self._memory_s:
+            self._late.popleft()
 
     def to_dict(self) -> dict[str, list[float] | None]:
-        return {"shift": self.shift.tolist(), "level": None if self.level is None else self.level.tolist()}
+        level = self.level
+        return {"shift": self.shift.tolist(), "level": None if level is None else level.tolist()}
 
     def restore(self, shift: Sequence[float], level: Sequence[float] | None) -> None:
         """Go on from a former run: the device may have been switched off since.
@@ -83,5 +96,6 @@ class Continuity:
         if len(shift) != len(self.shift) or (level is not None and len(level) != len(self.shift)):
             raise ValueError("another number of cells")
         self.shift = np.array(shift, dtype=float)
-        self.level = None if level is None else np.array(level, dtype=float)
+        self._late.clear()
+        self._level = None if level is None else np.array(level, dtype=float)
         self.interrupted()

@@ -142,9 +142,14 @@ class Rig:
 
     async def count(self, labels: int, timeout_s: float = 10.0) -> dict[str, LabelView]:
         """Wait until the server has so many labels."""
-        async with asyncio.timeout(timeout_s):
-            while len(found := await self.labels()) != labels:
-                await asyncio.sleep(0.05)
+        found = await self.labels()
+        try:
+            async with asyncio.timeout(timeout_s):
+                while len(found) != labels:
+                    await asyncio.sleep(0.05)
+                    found = await self.labels()
+        except TimeoutError:
+            raise AssertionError(f"not {labels} labels within {timeout_s} s, but {found}") from None
         return found
 
     @contextlib.asynccontextmanager

@@ -84,7 +84,7 @@ async def test_faults_of_a_reader(rig):
             reader.silent = False
             await cabinet.state("connected")
 
-            reader.nack_next = 10
+            reader.nack_next = 1_000_000  # until told otherwise: a short fault is not always seen
             await cabinet.state("faulty", "refuses", SOON_S)
             reader.nack_next = 0
             await cabinet.state("connected")

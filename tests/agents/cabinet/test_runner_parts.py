@@ -85,6 +85,25 @@ def test_what_people_did_meanwhile_is_a_change():
     assert interrupted([500.0, 300.0], [512.0, 313.0])[1] == [512.0, 313.0]  # a light thing, on both cells
 
 
+def test_what_a_stuck_cell_showed_is_forgotten_at_once():
+    continuity = Continuity(2, zeroes_itself=False)
+    for n in range(150):
+        continuity.take(n * 0.02, np.array([500.0, 9000.0 if 50 <= n < 110 else 300.0]))
+    continuity.interrupted()
+    later = [continuity.take(9 + n * 0.02, np.array([508.0, 291.0])) for n in range(50)]
+    assert later[-1] is not None and later[-1].tolist() == [500.0, 300.0]
+
+
+def test_what_was_under_way_before_the_interruption_tells_no_level():
+    continuity = Continuity(2, zeroes_itself=False)
+    for n in range(50):
+        continuity.take(n * 0.02, np.array([500.0, 300.0]))
+    continuity.interrupted()
+    assert continuity.take(5.0, np.array([514.0, 286.0])) is None
+    later = [continuity.take(6.0 + n * 0.02, np.array([508.0, 291.0])) for n in range(50)]
+    assert later[0] is None and later[-1] is not None and later[-1].tolist() == [500.0, 300.0]
+
+
 def test_a_corrected_zero_is_remembered():
     first = Continuity(1, zeroes_itself=True)
     first.take(0.0, np.array([400.0]))
