@@ -17,7 +17,7 @@ ALLOWED: dict[str, set[str]] = {
     "tms_client": {"tms_schemas", "pydantic", "httpx", "websockets"},
     "tms_agents": {
         *("tms_schemas", "tms_client", "pydantic", "pydantic_settings", "httpx"),
-        *("numpy", "numba", "scipy", "serial", "pymodbus"),
+        *("numpy", "numba", "scipy", "serial", "pymodbus", "rosbags"),
     },
     "tms_agents/slam": {"tms_agents/slam", "numpy", "numba", "scipy"},
     "tms_server": {

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -17,6 +14,7 @@ from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
 from tms_agents.cabinet.calibration import Solution
 from tms_agents.config import Section
+from tms_agents.files import write_atomically
 from tms_client.cli import CommandError
 from tms_schemas.base import Xy
 
@@ -103,22 +101,6 @@ def write_calibration(path: Path, boards: Mapping[str, BoardCalibration]) -> Pat
     except OSError as error:
         raise CommandError(f"{path}: {error.strerror}") from error
     return old
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """The whole file or none of it, also through a power cut."""
-    number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(number, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
 
 
 def _table(board: BoardCalibration) -> str:

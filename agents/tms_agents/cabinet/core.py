@@ -11,13 +11,13 @@ from typing import Any
 from tms_agents.cabinet import CabinetEvent, KnownWeight
 from tms_agents.cabinet.board import Board
 from tms_agents.cabinet.calibration_file import BoardCalibration
-from tms_agents.cabinet.clocks import Clocks
 from tms_agents.cabinet.config import CabinetConfig, ReaderSection
 from tms_agents.cabinet.field_turns import FieldTurns
 from tms_agents.cabinet.labels import Labels
 from tms_agents.cabinet.rounds import Round, Rounds
 from tms_agents.cabinet.single import anywhere
 from tms_agents.cabinet.story import told
+from tms_agents.clocks import Clocks
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.tags import Field, RoundEnd, TagItem
 from tms_agents.devices.transport import DeviceState

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from tms_agents.cabinet.board import Board
-from tms_agents.cabinet.clocks import Clocks
 from tms_agents.cabinet.core import Cabinet, Reader
+from tms_agents.clocks import Clocks
 from tms_agents.devices.transport import DeviceState
 
 

@@ -10,13 +10,13 @@ from collections.abc import AsyncGenerator, Mapping
 from typing import Any
 
 from tms_agents.cabinet.calibration_file import BoardCalibration
-from tms_agents.cabinet.clocks import Clocks
 from tms_agents.cabinet.config import CabinetConfig
 from tms_agents.cabinet.core import Cabinet
 from tms_agents.cabinet.listening import listen_to_board, listen_to_reader, tick
-from tms_agents.cabinet.live import socket_path, views
-from tms_agents.cabinet.state import peek_state, state_path
 from tms_agents.cabinet.view import view_of
+from tms_agents.clocks import Clocks
+from tms_agents.live import socket_path, views
+from tms_agents.state import peek_state, state_path
 
 _PERIOD_S = 0.2
 

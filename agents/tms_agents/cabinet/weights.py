@@ -10,8 +10,8 @@ from collections.abc import AsyncGenerator
 from pathlib import Path
 
 from tms_agents.cabinet import KnownWeight
-from tms_agents.cabinet.calibration_file import write_atomically
 from tms_agents.cabinet.config import WeightsSection
+from tms_agents.files import write_atomically
 from tms_client import AsyncTown
 from tms_client.errors import NotFound, TownError
 from tms_schemas.objects import TownObject

@@ -5,9 +5,9 @@ from __future__ import annotations
 from cabinet_rig import Shelf, calibration_toml, config_toml
 
 from tms_agents.cabinet.calibration_file import read_calibration
-from tms_agents.cabinet.clocks import Clocks
 from tms_agents.cabinet.config import CabinetConfig
 from tms_agents.cabinet.core import Cabinet
+from tms_agents.clocks import Clocks
 from tms_agents.config import read_config
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.transport import DeviceState

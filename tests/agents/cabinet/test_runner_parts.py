@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.cabinet import Appeared, Identified, LoadChanged, Moved, Stay, Vanished, ZoneRead
-from tms_agents.cabinet.clocks import Clocks
 from tms_agents.cabinet.continuity import Continuity
 from tms_agents.cabinet.field_turns import FieldTurns
 from tms_agents.cabinet.frames import BoardPose
 from tms_agents.cabinet.labels import Labels
 from tms_agents.cabinet.rounds import Rounds
+from tms_agents.clocks import Clocks
 from tms_agents.devices.tags import Field, RoundEnd, TagRead
 
 angles = st.floats(-7, 7)

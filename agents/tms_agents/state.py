@@ -1,4 +1,4 @@
-"""What a cabinet agent remembers across restarts: a JSON file beside its spool, replaced in one step."""
+"""What an agent remembers across restarts: a JSON file beside its spool, replaced in one step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 from pathlib import Path
 from typing import Any
 
-from tms_agents.cabinet.calibration_file import write_atomically
+from tms_agents.files import write_atomically
 
 log = logging.getLogger(__name__)
 _FORMAT = 1
