@@ -1,0 +1,19 @@
+"""Floor sensing: who walks and what lies in a room, from lasers that sweep just above the floor."""
+
+from tms_agents.floor.estimator import FloorEstimator
+from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.settings import FloorSettings, Scene, Sensor
+
+__all__ = [
+    "Appeared",
+    "Back",
+    "FloorEstimator",
+    "FloorEvent",
+    "FloorLabel",
+    "FloorSettings",
+    "Moved",
+    "Scene",
+    "Sensor",
+    "Stale",
+    "Vanished",
+]

@@ -1,0 +1,208 @@
+"""The floor estimator: scans of lasers just above the floor in, who walks there and what lies there out. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tms_agents.floor.association import associate
+from tms_agents.floor.bodies import predict
+from tms_agents.floor.events import FloorEvent, FloorLabel
+from tms_agents.floor.freespace import LOOK, look
+from tms_agents.floor.furniture import Furniture
+from tms_agents.floor.masks import Masks
+from tms_agents.floor.objects import Objects, candidates, near_movers
+from tms_agents.floor.prints import attend, follow
+from tms_agents.floor.settings import FloorSettings, Scene, Sensor
+from tms_agents.floor.state import BODY, PRINT, THING, empty, pack, unpack
+from tms_agents.floor.tracks import Tracks
+from tms_agents.floor.view import View
+
+Array = NDArray[np.float64]
+
+#: As many as there can be at once.
+_BODIES, _PRINTS, _THINGS = 48, 192, 128
+
+
+class FloorEstimator:
+    """Several lasers of one room; room frame, metres, seconds. Scans of a sensor come in the order of their times."""
+
+    def __init__(
+        self,
+        sensors: Mapping[str, Sensor],
+        settings: FloorSettings | None = None,
+        scene: Scene | None = None,
+    ) -> None:
+        self._settings, self._scene = settings or FloorSettings(), scene or Scene()
+        self._views = {
+            name: View(index, sensor, self._settings, tuple(self._scene.mirrors))
+            for index, (name, sensor) in enumerate(sensors.items())
+        }
+        self._masks = Masks(self._scene.region, self._scene.masks)
+        self._prints = empty(PRINT, _PRINTS)
+        self._tracks = Tracks(empty(BODY, _BODIES), self._settings, self._scene)
+        self._objects = Objects(empty(THING, _THINGS), self._settings)
+        self._furniture = Furniture()
+        self._looks = np.zeros(_THINGS, LOOK)
+        self._of = np.zeros(256, np.int64)
+        self._labels = 0
+        self._t = -np.inf
+
+    def scan(self, sensor: str, t: float, ranges: Array, intensities: Array | None = None) -> list[FloorEvent]:
+        """Take one scan, (n,) m, whose first beam was measured at ``t``: what happened, in the order told to a server.
+
+        Raises:
+            ValueError: an unknown sensor, another number of beams, or a time before the sensor's last.
+        """
+        view = self._views.get(sensor)
+        if view is None:
+            raise ValueError(f"there is no floor sensor {sensor!r}")
+        if np.shape(ranges) != (view.n,):
+            raise ValueError(f"a scan of {sensor!r} has {view.n} ranges, not {np.shape(ranges)}")
+        if view.last is not None and t < view.last:
+            raise ValueError(f"the scans of {sensor!r} go back in time")
+        dt = 0.0 if view.last is None else min(t - view.last, 1.0)
+        view.last = t
+        t = self._t = max(t, self._t)
+        view.take(ranges)
+        background = view.background
+        states = background.classify(view.ranges)
+        view.claimed[:] = False
+        events: list[FloorEvent] = []
+        if background.ready:
+            events = self._understand(view, states, t, dt)
+        if background.learn(view.ranges, view.claimed, dt):
+            beams = np.flatnonzero(background.gone)
+            self._furniture.revealed(t, beams, background.gone[beams], view.rays)
+        return events
+
+    def labels(self) -> list[FloorLabel]:
+        """Everything on the floor now, oldest label first."""
+        return sorted(self._tracks.labels(self._t) + self._objects.labels(), key=lambda label: label.id)
+
+    def _understand(self, view: View, states: NDArray[np.int8], t: float, dt: float) -> list[FloorEvent]:
+        bodies, prints = self._tracks.bodies, self._prints
+        objects = self._objects
+        look(
+            objects.things,
+            view.ranges,
+            states,
+            view.background.empty,
+            view.rays,
+            view.ways,
+            view.pose,
+            view.first,
+            view.step,
+            view.claimed,
+            self._looks,
+        )
+        clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.rays))
+        of = self._of[: clusters.size]
+        follow(clusters, of, prints, view.index, t, *view.sight)
+        predict(bodies, t)
+        somebodys = associate(clusters, of, prints, bodies, t)
+        attend(prints, bodies, t)
+        vanished = objects.weigh(self._looks, bodies, t, dt)
+        movers = self._tracks.review(t, dt, view.sight, self._new_label)
+        appeared: list[FloorEvent] = []
+        if view.background.learned:
+            for index, is_object in objects.ripe(prints, bodies, t):
+                appeared += self._settle(index, t, is_object=is_object)
+        self._protect(view, clusters, of, somebodys)
+        return vanished + movers + appeared
+
+    def _settle(self, index: int, t: float, *, is_object: bool) -> list[FloorEvent]:
+        """A print rests: it is an object or furniture."""
+        q = self._prints[index]
+        started = min(view.background.seconds for view in self._views.values())
+        if not is_object or t - q["first"] > started - self._settings.learn_s or self._furniture.explains(q, t):
+            q["revealed"] = 2
+            return []
+        who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})
+        events = self._objects.born(q, self._new_label(), who, t)
+        q["used"] = 0
+        return events
+
+    def _protect(self, view: View, clusters: Any, of: NDArray[np.int64], somebodys: NDArray[np.bool_]) -> None:
+        """What is somebody or something is not learned as background; furniture is, at once."""
+        if not view.background.learned:
+            view.claimed[:] = False
+            return
+        for k in range(clusters.size):
+            q = self._prints[of[k]]
+            beams = slice(int(clusters["first"][k]), int(clusters["last"][k]) + 1)
+            if q["revealed"] == 2:
+                span = np.arange(beams.start, beams.stop)
+                span = span[view.background.states[span] == 3]
+                view.background.adopt(span, view.ranges[span])
+            elif somebodys[k] or (q["hits"] >= 3 and q["hits"] > 0.6 * q["looks"]):
+                view.claimed[beams] = True
+
+    def _new_label(self) -> int:
+        self._labels += 1
+        return self._labels
+
+    # --- across restarts
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything known, as JSON values: backgrounds, movers, objects, and the last label given."""
+        sensors = {}
+        for name, view in self._views.items():
+            arrays, numbers = view.background.save()
+            sensors[name] = {
+                "background": {key: pack(array) for key, array in arrays.items()},
+                **numbers,
+                "pose": view.pose.tolist(),
+                "last": view.last,
+            }
+        return {
+            "format": 1,
+            "sensors": sensors,
+            "bodies": pack(self._tracks.bodies),
+            "prints": pack(self._prints),
+            "things": pack(self._objects.things),
+            "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
+            "furniture": self._furniture.save(),
+            "labels": self._labels,
+            "t": self._t if np.isfinite(self._t) else None,
+        }
+
+    @classmethod
+    def from_dict(
+        cls,
+        state: Mapping[str, Any],
+        sensors: Mapping[str, Sensor],
+        settings: FloorSettings | None = None,
+        scene: Scene | None = None,
+    ) -> Self:
+        """Go on from a saved state.
+
+        Raises:
+            ValueError: the state is damaged, of another format, or of other sensors.
+        """
+        if state.get("format") != 1:
+            raise ValueError("the saved state of the floor estimator has a format that this version does not know")
+        self = cls(sensors, settings, scene)
+        try:
+            if set(state["sensors"]) != set(self._views):
+                raise ValueError("the saved state of the floor estimator is of other sensors")
+            for name, view in self._views.items():
+                saved = state["sensors"][name]
+                like, _ = view.background.save()
+                arrays = {key: unpack(saved["background"][key], array) for key, array in like.items()}
+                view.background.restore(arrays, saved)
+                view.last = saved["last"]
+                view.move(tuple(saved["pose"]))
+            self._tracks.bodies[:] = unpack(state["bodies"], self._tracks.bodies)
+            self._prints[:] = unpack(state["prints"], self._prints)
+            self._objects.things[:] = unpack(state["things"], self._objects.things)
+            self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
+            self._furniture.restore(state["furniture"])
+            self._labels = int(state["labels"])
+            self._t = -np.inf if state["t"] is None else float(state["t"])
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"the saved state of the floor estimator is damaged: {error}") from None
+        return self

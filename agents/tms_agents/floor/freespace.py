@@ -1,0 +1,167 @@
+"""Whether a place is seen to be taken, seen to be free, or hidden: a hidden thing is never given up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO
+
+Array = NDArray[np.float64]
+
+#: What a scan says of a place: not in view, taken, hidden by something nearer, free.
+UNSEEN, HIT, HIDDEN, FREE, WALLED = 0, 1, 2, 3, 4
+
+#: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
+#: nothing else was seen.
+LOOK = np.dtype(
+    [("verdict", "i8"), ("n", "i8"), ("x", "f8"), ("y", "f8"), ("width", "f8"), ("clean", "i8"), ("spacing", "f8")]
+)
+
+
+@njit(cache=True)
+def beam_of(bearing: float, first: float, step: float, n: int) -> float:
+    """Index (fraction) of the beam at ``bearing`` rad, of n beams from ``first`` on every ``step`` rad; NaN: none."""
+    middle = first + 0.5 * step * (n - 1)
+    off: float = bearing - middle
+    off -= 2.0 * np.pi * np.round(off / (2.0 * np.pi))
+    index = off / step + 0.5 * (n - 1)
+    if index < -0.5 or index > n - 0.5:
+        return float(np.nan)
+    return index
+
+
+@njit(cache=True)
+def look(
+    things: Any,
+    ranges: Array,
+    states: NDArray[np.int8],
+    empty: Array,
+    rays: Array,
+    views: Array,
+    pose: Array,
+    first: float,
+    step: float,
+    claimed: NDArray[np.bool_],
+    looks: Any,
+) -> None:
+    """What one scan says of each thing, into ``looks``; its beams are marked in ``claimed`` (n,).
+
+    views: (m, 6) reflections, the first the identity; pose: (3,) sensor; first, step: bearings, rad.
+    """
+    n = ranges.size
+    for k in range(things.size):
+        thing = things[k]
+        out = looks[k]
+        out.verdict = UNSEEN
+        out.n = 0
+        if not thing.used:
+            continue
+        for v in range(views.shape[0]):
+            vx = views[v, 0] * thing.x + views[v, 1] * thing.y + views[v, 4]
+            vy = views[v, 2] * thing.x + views[v, 3] * thing.y + views[v, 5]
+            away = np.hypot(vx - pose[0], vy - pose[1])
+            middle = beam_of(np.arctan2(vy - pose[1], vx - pose[0]) - pose[2], first, step, n)
+            if np.isnan(middle) or away < 0.05:
+                continue
+            half_angle = np.arctan(thing.half / away) / abs(step)
+            gate = thing.half + 0.02 + 0.004 * away
+            low = max(0, int(np.ceil(middle - half_angle - 1.0)))
+            high = min(n - 1, int(np.floor(middle + half_angle + 1.0)))
+            inner = max(0.5, 0.75 * half_angle)
+            hits, beyond, hidden, total, alien = 0, 0, 0, 0, 0
+            x, y = 0.0, 0.0
+            a, b = -1, -1
+            for i in range(low, high + 1):
+                mirrored = away > rays[i, 8]
+                if mirrored != (v > 0) or (mirrored and int(rays[i, 9]) != v - 1):
+                    continue
+                r = ranges[i]
+                if states[i] == FOREGROUND and abs(r - away) <= gate:
+                    o = 4 if mirrored else 0
+                    x += rays[i, o] + r * rays[i, o + 2]
+                    y += rays[i, o + 1] + r * rays[i, o + 3]
+                    claimed[i] = True
+                    hits += 1
+                    if a < 0:
+                        a = i
+                    b = i
+                elif states[i] == FOREGROUND and r < away + 0.3:
+                    alien += 1
+                if abs(i - middle) > inner:
+                    continue
+                total += 1
+                if (
+                    states[i] == BEYOND
+                    or (states[i] == BACKGROUND and r > away - gate)
+                    or (states[i] == FOREGROUND and r > away + gate)
+                    or (states[i] == NO_ECHO and empty[i] > 0.5)
+                ):
+                    beyond += 1
+                elif states[i] != NO_ECHO and r < away - gate:
+                    hidden += 1
+            if total == 0:
+                continue
+            if hits > 0:
+                out.verdict = HIT
+                out.n = hits
+                out.spacing = away * abs(step)
+                out.width = hits * out.spacing
+                shift = 0.37 * min(out.width, 0.5)
+                m = (a + b) // 2
+                o = 4 if v > 0 else 0
+                out.x = x / hits + shift * rays[m, o + 2]
+                out.y = y / hits + shift * rays[m, o + 3]
+                out.clean = 1 if alien == 0 and b - a + 1 == hits else 0
+                break
+            if 2 * beyond >= total and hidden == 0:
+                out.verdict = FREE
+                break
+            if out.verdict == UNSEEN and hidden > 0:
+                out.verdict = HIDDEN
+
+
+@njit(cache=True)
+def clear(
+    x: float,
+    y: float,
+    half: float,
+    ranges: Array,
+    states: NDArray[np.int8],
+    longest: Array,
+    pose: Array,
+    first: float,
+    step: float,
+) -> int:
+    """Whether the sensor looks past (x, y) ± half m.
+
+    FREE, HIDDEN behind something new, WALLED behind the background, else UNSEEN (out of view or reach).
+    """
+    n = ranges.size
+    away = np.hypot(x - pose[0], y - pose[1])
+    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
+    if np.isnan(middle):
+        return UNSEEN
+    reach = np.arctan(half / max(away, 0.05)) / abs(step)
+    low, high = max(0, int(middle - reach)), min(n - 1, int(middle + reach + 1))
+    beyond, hidden, walled, total = 0, 0, 0, 0
+    for i in range(low, high + 1):
+        if states[i] == 0:
+            continue
+        total += 1
+        if states[i] == FOREGROUND and ranges[i] < away - half:
+            hidden += 1
+        elif states[i] != NO_ECHO and ranges[i] > away + half:
+            beyond += 1
+        elif states[i] == BACKGROUND and ranges[i] < away - half:
+            walled += 1
+    if total == 0:
+        return UNSEEN
+    if 3 * hidden >= total:
+        return HIDDEN
+    if 2 * walled >= total:
+        return WALLED
+    return FREE if 2 * beyond >= total else UNSEEN

@@ -1,0 +1,94 @@
+"""Polygons of the room: where labels are wanted, what is ignored, where people sit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.settings import Polygon
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def inside(polygon: Array, x: float, y: float) -> bool:
+    """Whether (x, y) lies in the polygon (n, 2)."""
+    n = polygon.shape[0]
+    odd = False
+    j = n - 1
+    for i in range(n):
+        if (polygon[i, 1] > y) != (polygon[j, 1] > y):
+            share = (y - polygon[i, 1]) / (polygon[j, 1] - polygon[i, 1])
+            if x < polygon[i, 0] + share * (polygon[j, 0] - polygon[i, 0]):
+                odd = not odd
+        j = i
+    return odd
+
+
+@njit(cache=True)
+def distance(polygon: Array, x: float, y: float) -> float:
+    """How far (x, y) is from the polygon (n, 2), m; 0 inside."""
+    if inside(polygon, x, y):
+        return 0.0
+    n = polygon.shape[0]
+    best = np.inf
+    for i in range(n):
+        ax, ay = polygon[i, 0], polygon[i, 1]
+        dx, dy = polygon[(i + 1) % n, 0] - ax, polygon[(i + 1) % n, 1] - ay
+        share = ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)
+        share = min(1.0, max(0.0, share))
+        best = min(best, np.hypot(ax + share * dx - x, ay + share * dy - y))
+    return best
+
+
+@njit(cache=True)
+def _wanted(clusters: Any, region: Array, masks: Array, sizes: NDArray[np.int64], margin: float) -> int:
+    """Move the clusters (m,) that count to the front; how many there are."""
+    kept = 0
+    for k in range(clusters.size):
+        c = clusters[k]
+        good = region.shape[0] == 0 or distance(region, c.x, c.y) <= margin
+        start = 0
+        for m in range(sizes.size):
+            if good and inside(masks[start : start + sizes[m]], c.x, c.y):
+                good = False
+            start += sizes[m]
+        if good:
+            if kept != k:
+                clusters[kept] = c
+            kept += 1
+    return kept
+
+
+class Area:
+    """Several polygons as arrays for the kernels."""
+
+    def __init__(self, polygons: Sequence[Polygon]) -> None:
+        self.polygons = [np.asarray(polygon, dtype=float) for polygon in polygons]
+
+    def distance(self, x: float, y: float) -> float:
+        """How far (x, y) is from the nearest polygon, m; inf where there is none."""
+        return min((float(distance(polygon, x, y)) for polygon in self.polygons), default=np.inf)
+
+
+class Masks:
+    """Which clusters count."""
+
+    #: What is a little outside (m) still counts: a foot on the threshold.
+    MARGIN_M = 0.15
+
+    def __init__(self, region: Polygon | None, masks: Sequence[Polygon]) -> None:
+        self._region = np.zeros((0, 2)) if region is None else np.asarray(region, dtype=float)
+        self._masks = np.concatenate([np.asarray(m, dtype=float) for m in masks]) if masks else np.zeros((0, 2))
+        self._sizes = np.array([len(m) for m in masks], dtype=np.int64)
+        self._any = region is not None or bool(masks)
+
+    def __call__(self, clusters: Any) -> Any:
+        """The clusters (m,) in the region and in no mask; they are moved to the front of the array."""
+        if not self._any:
+            return clusters
+        return clusters[: _wanted(clusters, self._region, self._masks, self._sizes, self.MARGIN_M)]

@@ -1,0 +1,204 @@
+"""The life of an object: born when it lies there and nobody stands at it, dead only when its place is seen empty."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
+from tms_agents.floor.freespace import FREE, HIT
+from tms_agents.floor.settings import FloorSettings
+
+Array = NDArray[np.float64]
+
+#: How near who acts is (m, Gaussian), and who is too far to have acted.
+_ARM_M, _FAR_M = 0.5, 1.6
+#: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
+_SURE, _PER_SCAN = 9.0, 1.5
+#: Surfaces lie this uncertain behind what is seen (m²).
+_SURFACE_VAR = 0.006**2
+
+
+@njit(cache=True)
+def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
+    """Take in what a scan says of each thing; how many have been seen to be free for a while."""
+    waiting = 0
+    for k in range(things.size):
+        thing, seen = things[k], looks[k]
+        if not thing.used:
+            continue
+        if seen.verdict == HIT:
+            thing.seen = t
+            thing.rate += 0.02 * (1.0 - thing.rate)
+            thing.free = 0.0
+            thing.doubt = max(0.0, thing.doubt - 3.0)
+            if seen.clean and abs(seen.width - 2.0 * thing.half) < 0.5 * thing.half + 1.6 * seen.spacing:
+                thing.hits += 1
+                gain = max(1.0 / (thing.hits + 1), 0.01)
+                thing.x += gain * (seen.x - thing.x)
+                thing.y += gain * (seen.y - thing.y)
+                thing.half += gain * (0.5 * seen.width - thing.half)
+                thing.var = _SURFACE_VAR + 1e-4 / (thing.hits + 1)
+        elif seen.verdict == FREE:
+            thing.free += min(dt, t - thing.free_at, 0.2)
+            thing.doubt += min(_PER_SCAN, -np.log(max(1.0 - thing.rate, 1e-3)))
+            if thing.doubt < 4.0:
+                thing.rate -= 0.02 * thing.rate
+        thing.free_at = t
+        if thing.free > 0.0:
+            waiting += 1
+    return waiting
+
+
+@njit(cache=True)
+def _ripe(
+    prints: Any, bodies: Any, t: float, rest_s: float, alone_s: float, width_m: float, ripe: NDArray[np.int64]
+) -> int:
+    """Prints that are objects (1) or furniture (2) by now, into ``ripe``; how many."""
+    count = 0
+    for j in range(prints.size):
+        q = prints[j]
+        ripe[j] = 0
+        if not q.used or q.owner >= 0 or t - q.last > 0.25 or q.revealed == 2:
+            continue
+        age = t - q.first
+        if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
+            continue
+        if q.spread > 0.03:
+            continue
+        # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
+        if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) or (
+            q.beams < 1.5 and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks)
+        ):
+            continue
+        alone = t - q.busy > alone_s
+        third = False
+        for b in range(bodies.size):
+            body = bodies[b]
+            if not body.used or not body.confirmed or body.stale or t - body.seen > 0.2:
+                continue
+            d = min(np.hypot(body.ax - q.x, body.ay - q.y), np.hypot(body.bx - q.x, body.by - q.y))
+            both = t - body.a_seen < 0.2 and t - body.b_seen < 0.2
+            if both and d > 0.15 + 0.5 * q.width and age > 1.25 * rest_s and q.first > max(body.a_since, body.b_since):
+                third = True
+            elif np.hypot(body.x - q.x, body.y - q.y) < 0.6:
+                third = False
+                break
+        if not alone and not third:
+            continue
+        if q.width < width_m:
+            ripe[j] = 1
+            count += 1
+        elif alone and age > 2.0:
+            ripe[j] = 2
+            count += 1
+    return count
+
+
+class Objects:
+    """Objects: the used ones of ``things``, their labels and events."""
+
+    def __init__(self, things: Any, settings: FloorSettings) -> None:
+        self.things = things
+        self._settings = settings
+        #: For each object not seen now: label of a mover -> how near (m) it has been since the object was last seen.
+        self.visitors: dict[int, dict[int, float]] = {}
+        self._ripe = np.zeros(0, np.int64)
+
+    def weigh(self, looks: Any, bodies: Any, t: float, dt: float) -> list[FloorEvent]:
+        """Take in what a scan says (`freespace.look`) of each thing: removals."""
+        waiting = _weigh(self.things, looks, t, dt)
+        self._attend(bodies, t)
+        events: list[FloorEvent] = []
+        if not waiting:
+            return events
+        due = (self.things["used"] == 1) & (self.things["free"] >= self._settings.free_s - 0.05)
+        for index in np.flatnonzero(due & (self.things["doubt"] >= _SURE - 1e-9)).tolist():
+            thing = self.things[index]
+            who = _candidates(self.visitors.pop(int(thing["label"]), {}))
+            events.append(Vanished(t, int(thing["label"]), float(thing["seen"]), t, who))
+            thing["used"] = 0
+        return events
+
+    def ripe(self, prints: Any, bodies: Any, t: float) -> list[tuple[int, bool]]:
+        """Prints that are objects (True) or furniture (False) by now."""
+        s = self._settings
+        if self._ripe.size != prints.size:
+            self._ripe = np.zeros(prints.size, np.int64)
+        if not _ripe(prints, bodies, t, s.rest_s, s.alone_s, s.object_width_m, self._ripe):
+            return []
+        return [(j, bool(self._ripe[j] == 1)) for j in np.flatnonzero(self._ripe).tolist()]
+
+    def born(self, print_: Any, label: int, who: Candidates, t: float) -> list[FloorEvent]:
+        """The print is an object."""
+        slot = int(self.things["used"].argmin())
+        thing = self.things[slot]
+        if thing["used"]:
+            return []
+        thing["used"], thing["label"] = 1, label
+        thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]
+        thing["hits"] = min(int(print_["whole"]), 30)
+        thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
+        thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["first"], t, 0.0, 0.0, t
+        thing["rate"] = min(0.99, max(0.5, print_["hits"] / max(int(print_["looks"]), 1)))
+        since, width = float(thing["since"]), float(print_["width"])
+        return [Appeared(t, label, "object", _xy(thing), _cov(thing), False, since, who, width)]
+
+    def labels(self) -> list[FloorLabel]:
+        """The objects there are, hidden ones too."""
+        return [
+            FloorLabel(
+                int(thing["label"]), "object", _xy(thing), _cov(thing), float(thing["since"]), float(thing["seen"])
+            )
+            for thing in self.things
+            if thing["used"]
+        ]
+
+    def _attend(self, bodies: Any, t: float) -> None:
+        """Remember who came near an object while it was not seen: that is who may have taken it."""
+        used = self.things["used"] == 1
+        for index in np.flatnonzero(used).tolist():
+            thing = self.things[index]
+            label = int(thing["label"])
+            if thing["seen"] == t:
+                # Whoever was near when it was last seen: kept from this scan on.
+                self.visitors.pop(label, None)
+                if not _any_near(bodies, thing["x"], thing["y"]):
+                    continue
+            visitors = self.visitors.setdefault(label, {})
+            for near, mover in near_movers(bodies, float(thing["x"]), float(thing["y"])):
+                visitors[mover] = min(near, visitors.get(mover, math.inf))
+
+
+def near_movers(bodies: Any, x: float, y: float) -> list[tuple[float, int]]:
+    """How far (m) each mover is that could reach (x, y), and its label."""
+    present = (bodies["used"] == 1) & (bodies["confirmed"] == 1)
+    away = np.hypot(bodies["x"] - x, bodies["y"] - y)
+    return [(float(away[b]), int(bodies["label"][b])) for b in np.flatnonzero(present & (away < _FAR_M)).tolist()]
+
+
+def _any_near(bodies: Any, x: float, y: float) -> bool:
+    return bool(near_movers(bodies, x, y))
+
+
+def _candidates(visitors: dict[int, float]) -> Candidates:
+    """Who acted, by how near each came; the remainder is that it was nobody known."""
+    weights = {mover: math.exp(-(near**2) / (2 * _ARM_M**2)) for mover, near in visitors.items()}
+    total = sum(weights.values()) + 0.02
+    return tuple(sorted(((mover, w / total) for mover, w in weights.items()), key=lambda item: (-item[1], item[0])))
+
+
+candidates = _candidates
+
+
+def _xy(thing: Any) -> tuple[float, float]:
+    return float(thing["x"]), float(thing["y"])
+
+
+def _cov(thing: Any) -> tuple[float, float, float]:
+    variance = float(thing["var"])
+    return variance, 0.0, variance

@@ -1,0 +1,143 @@
+"""Prints: places where a cluster stands still. A standing foot is one, and so is a thing that was put down."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.freespace import FREE, clear
+
+Array = NDArray[np.float64]
+
+#: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
+_STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
+#: Somebody is at a print when the body or a foot is so near (m).
+NEAR_M = 0.36
+
+
+@njit(cache=True)
+def follow(
+    clusters: Any,
+    of: NDArray[np.int64],
+    prints: Any,
+    sensor: int,
+    t: float,
+    ranges: Array,
+    states: NDArray[np.int8],
+    longest: Array,
+    pose: Array,
+    first: float,
+    step: float,
+) -> None:
+    """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster."""
+    m, p = clusters.size, prints.size
+    of[:] = -1
+    near = np.full(m, np.inf)
+    which = np.full(m, -1)
+    taken = np.zeros(p, np.bool_)
+    for _ in range(m):
+        best, best_k = np.inf, -1
+        for k in range(m):
+            if of[k] >= 0:
+                continue
+            c = clusters[k]
+            if which[k] == -1 or (which[k] >= 0 and taken[which[k]]):
+                near[k], which[k] = np.inf, -2
+                for j in range(p):
+                    if not prints[j].used or taken[j]:
+                        continue
+                    d = np.hypot(c.x - prints[j].x, c.y - prints[j].y)
+                    gate = 0.05 + 0.006 * c.near + 0.25 * min(max(c.width, prints[j].width), 0.4)
+                    if d < gate and d < near[k]:
+                        near[k], which[k] = d, j
+            if which[k] >= 0 and near[k] < best:
+                best, best_k = near[k], k
+        if best_k < 0:
+            break
+        of[best_k] = which[best_k]
+        taken[which[best_k]] = True
+    for k in range(m):
+        c = clusters[k]
+        j = of[k]
+        if j < 0:
+            for i in range(p):
+                if not prints[i].used:
+                    j = i
+                    break
+            if j < 0:
+                continue
+            of[k] = j
+            taken[j] = True
+            q = prints[j]
+            q.used, q.first, q.hits, q.looks, q.whole = 1, t, 0, 0, 0
+            q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
+            q.last = t
+            q.owner, q.owned, q.busy, q.revealed = -1, -1e9, -1e9, 0
+        q = prints[j]
+        off = np.hypot(c.x - q.x, c.y - q.y)
+        if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
+            q.first, q.hits, q.looks, q.whole, q.spread = t, 0, 0, 0, 0.0
+            q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
+            q.revealed = 0
+        if t - q.last > _GONE_S:
+            # Somebody else may stand there now.
+            q.first, q.hits, q.looks, q.whole, q.spread = t, 0, 0, 0, 0.0
+        q.hits += 1
+        q.looks += 1
+        q.last = t
+        q.sensor, q.first_beam, q.last_beam = sensor, c.first, c.last
+        if not c.cut or q.whole == 0:
+            if not c.cut:
+                q.whole += 1
+            gain = max(0.05, 1.0 / max(q.whole, 1))
+            q.x += gain * (c.x - q.x)
+            q.y += gain * (c.y - q.y)
+            q.width += gain * (c.width - q.width)
+            q.spread += gain * (off - q.spread)
+            q.beams += gain * (c.n - q.beams)
+            q.near, q.spacing = c.near, c.spacing
+    for j in range(p):
+        q = prints[j]
+        if not q.used or taken[j]:
+            continue
+        if t - q.last > _HIDDEN_S:
+            q.used = 0
+        elif clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step) == FREE:
+            q.looks += 1
+            if t - q.last > _GONE_S:
+                q.used = 0
+
+
+@njit(cache=True)
+def attend(prints: Any, bodies: Any, t: float) -> None:
+    """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy)."""
+    for j in range(prints.size):
+        q = prints[j]
+        if not q.used:
+            for b in range(bodies.size):
+                if bodies[b].a_print == j:
+                    bodies[b].a_print = -1
+                if bodies[b].b_print == j:
+                    bodies[b].b_print = -1
+            continue
+        q.owner = -1
+        for b in range(bodies.size):
+            body = bodies[b]
+            if not body.used or not body.confirmed:
+                continue
+            if body.a_print == j or body.b_print == j:
+                q.owner = b
+                q.owned = t
+            if body.stale:
+                continue
+            d = np.hypot(body.x - q.x, body.y - q.y)
+            reach = NEAR_M + (0.3 if body.robot else 0.0)
+            if t - body.a_seen < 0.6 and body.a_print != j:
+                d = min(d, np.hypot(body.ax - q.x, body.ay - q.y))
+            if t - body.b_seen < 0.6 and body.b_print != j:
+                d = min(d, np.hypot(body.bx - q.x, body.by - q.y))
+            if d < reach:
+                q.busy = t

@@ -1,0 +1,144 @@
+"""What the estimator remembers between scans, as plain records that the kernels work on."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+
+#: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
+#: (x, y) m mean of where it was seen, first and last time seen, hits and looks (scans since), width m, spread m (mean
+#: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), freed (when a body was last
+#: near), touched (label of the last owner), beams of the last sighting.
+PRINT = np.dtype(
+    [
+        ("used", "i8"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("first", "f8"),
+        ("last", "f8"),
+        ("hits", "i8"),
+        ("looks", "i8"),
+        ("whole", "i8"),
+        ("width", "f8"),
+        ("spread", "f8"),
+        ("beams", "f8"),
+        ("near", "f8"),
+        ("spacing", "f8"),
+        ("owner", "i8"),
+        ("owned", "f8"),
+        ("busy", "f8"),
+        ("revealed", "i8"),
+        ("sensor", "i8"),
+        ("first_beam", "i8"),
+        ("last_beam", "i8"),
+    ]
+)
+
+#: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began,
+#: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown).
+BODY = np.dtype(
+    [
+        ("used", "i8"),
+        ("confirmed", "i8"),
+        ("label", "i8"),
+        ("robot", "i8"),
+        ("stale", "i8"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("vx", "f8"),
+        ("vy", "f8"),
+        ("pp", "f8"),
+        ("pv", "f8"),
+        ("vv", "f8"),
+        ("at", "f8"),
+        ("first", "f8"),
+        ("seen", "f8"),
+        ("hits", "i8"),
+        ("looks", "i8"),
+        ("both", "i8"),
+        ("x0", "f8"),
+        ("y0", "f8"),
+        ("width", "f8"),
+        ("wide", "f8"),
+        ("far", "f8"),
+        ("ax", "f8"),
+        ("ay", "f8"),
+        ("a_seen", "f8"),
+        ("a_since", "f8"),
+        ("a_print", "i8"),
+        ("bx", "f8"),
+        ("by", "f8"),
+        ("b_seen", "f8"),
+        ("b_since", "f8"),
+        ("b_print", "i8"),
+        ("told_x", "f8"),
+        ("told_y", "f8"),
+        ("told_at", "f8"),
+        ("from_furniture", "i8"),
+        ("clear", "f8"),
+    ]
+)
+
+#: An object: place (m) and its variance (m²), half its width, times, and for how long its place was seen to be free.
+THING = np.dtype(
+    [
+        ("used", "i8"),
+        ("label", "i8"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("var", "f8"),
+        ("half", "f8"),
+        ("since", "f8"),
+        ("seen", "f8"),
+        ("hits", "i8"),
+        ("free", "f8"),
+        ("free_at", "f8"),
+        ("doubt", "f8"),
+        ("rate", "f8"),
+    ]
+)
+
+
+def empty(kind: np.dtype[Any], capacity: int) -> Any:
+    """An array of ``capacity`` unused records."""
+    return np.zeros(capacity, kind)
+
+
+def free_slot(records: Any) -> int:
+    """Index of an unused record, -1 if all are used."""
+    used = records["used"]
+    index = int(used.argmin())
+    return index if not used[index] else -1
+
+
+def pack(array: Any) -> dict[str, Any]:
+    """An array as JSON values, exactly."""
+    return {
+        "kind": array.dtype.descr if array.dtype.names else array.dtype.str,
+        "shape": list(array.shape),
+        "data": base64.b64encode(np.ascontiguousarray(array).tobytes()).decode(),
+    }
+
+
+def unpack(value: Any, like: Any) -> Any:
+    """The array that `pack` gave.
+
+    Raises:
+        ValueError: not of the type and shape of ``like``, or damaged.
+    """
+    try:
+        kind = value["kind"]
+        expected = like.dtype.descr if like.dtype.names else like.dtype.str
+        same = (
+            [tuple(item) for item in kind] == [tuple(item) for item in expected]
+            if isinstance(kind, list) and isinstance(expected, list)
+            else kind == expected
+        )
+        if not same or tuple(value["shape"]) != like.shape:
+            raise ValueError("the saved state of the floor estimator is of another sensor or version")
+        data = base64.b64decode(value["data"], validate=True)
+        return np.frombuffer(data, like.dtype).reshape(like.shape).copy()
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"the saved state of the floor estimator is damaged: {error}") from None

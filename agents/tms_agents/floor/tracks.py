@@ -1,0 +1,247 @@
+"""The life of a mover: believed when it has walked, stale while hidden or seated, gone when its place is seen empty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
+from tms_agents.floor.masks import Area
+from tms_agents.floor.settings import FloorSettings, Scene
+
+Array = NDArray[np.float64]
+
+#: What `_review` finds of a body.
+_NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
+#: A mover is told again when it has moved so far (m).
+_TELL_M = 0.05
+#: A seated person's feet vanish so near the seat (m).
+_SEAT_M = 0.45
+#: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
+_OUT_M, _SPEED = 0.5, 0.9
+
+
+@njit(cache=True)
+def _review(
+    bodies: Any,
+    t: float,
+    dt: float,
+    ranges: Array,
+    states: NDArray[np.int8],
+    longest: Array,
+    pose: Array,
+    first: float,
+    step: float,
+    confirm_s: float,
+    confirm_m: float,
+    leave_s: float,
+    hidden_s: float,
+    stale_s: float,
+    actions: NDArray[np.int64],
+    inside: bool,
+) -> None:
+    """What is due for each body, into ``actions``; drops tentative ones that came to nothing."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        actions[b] = _NOTHING
+        if not body.used:
+            continue
+        unseen = t - body.seen
+        if not body.confirmed:
+            way = np.hypot(body.x - body.x0, body.y - body.y0)
+            age = body.seen - body.first
+            if unseen > 0.45 or (age > 3.0 and way < 0.15) or body.hits < 0.5 * body.looks - 1.0:
+                body.used = 0
+                continue
+            if unseen > 0.0:
+                continue
+            beside = np.inf
+            for o in range(bodies.size):
+                if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
+                    beside = min(beside, np.hypot(bodies[o].x - body.x, bodies[o].y - body.y))
+            needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
+            needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
+            if age >= needed_s and way >= needed_m and body.hits >= 4:
+                actions[b] = _CONFIRM
+            continue
+        if unseen == 0.0:
+            if body.stale:
+                actions[b] = _BACK
+            elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
+                actions[b] = _MOVED
+            continue
+        if unseen > 0.12:
+            view = clear(body.x, body.y, 0.15, ranges, states, longest, pose, first, step)
+            if view == FREE:
+                body.clear += dt
+            elif view == UNSEEN or (view == WALLED and not inside):
+                body.clear += 0.5 * dt
+            elif view == HIDDEN:
+                body.clear = max(0.0, body.clear - 0.5 * dt)
+        if body.clear > leave_s or unseen > hidden_s:
+            actions[b] = _GONE
+        elif unseen > stale_s and not body.stale:
+            actions[b] = _LOST
+
+
+class Tracks:
+    """Movers: which of ``bodies`` are believed, their labels and events."""
+
+    def __init__(self, bodies: Any, settings: FloorSettings, scene: Scene) -> None:
+        self.bodies = bodies
+        self._settings = settings
+        self._seats, self._gates = Area(scene.seats), Area(scene.gates)
+        self._region = Area([] if scene.region is None else [scene.region])
+        self._robots = [tuple(sorted(size)) for size in scene.robots]
+        self._actions = np.zeros(bodies.size, np.int64)
+
+    def review(self, t: float, dt: float, sight: tuple[Any, ...], new_label: Callable[[], int]) -> list[FloorEvent]:
+        """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes."""
+        s = self._settings
+        review: Any = _review
+        review(
+            self.bodies,
+            t,
+            dt,
+            *sight,
+            s.confirm_s,
+            s.confirm_m,
+            s.leave_s,
+            s.hidden_s,
+            s.stale_s,
+            self._actions,
+            bool(self._region.polygons),
+        )
+        events: list[FloorEvent] = []
+        for index in np.flatnonzero(self._actions).tolist():
+            body, action = self.bodies[index], self._actions[index]
+            if action == _GONE:
+                events += self._gone(body, t)
+            elif action == _LOST:
+                events += self._lost(body, t)
+            elif action == _BACK:
+                body["stale"] = 0
+                events.append(Back(t, int(body["label"]), _xy(body)))
+                _told(body, t)
+            elif action == _CONFIRM:
+                events += self._confirm(index, t, new_label)
+            else:
+                events.append(Moved(t, int(body["label"]), _xy(body), _cov(body)))
+                _told(body, t)
+        return events
+
+    def labels(self, t: float) -> list[FloorLabel]:
+        """The movers there are."""
+        return [
+            FloorLabel(
+                int(body["label"]),
+                "mover",
+                _xy(body),
+                _cov(body),
+                float(body["first"]),
+                float(body["seen"]),
+                None if body["stale"] else (float(body["vx"]), float(body["vy"])),
+                bool(body["robot"]),
+                bool(body["stale"]),
+            )
+            for body in self.bodies
+            if body["used"] and body["confirmed"]
+        ]
+
+    def _gone(self, body: Any, t: float) -> list[FloorEvent]:
+        if self._seated(body) and t - body["seen"] < 86400.0:
+            body["clear"] = 0.0
+            return self._lost(body, t)
+        body["used"] = 0
+        return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
+
+    def _lost(self, body: Any, t: float) -> list[FloorEvent]:
+        if body["stale"]:
+            return []
+        if self._outside(body):
+            body["used"] = 0
+            return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
+        body["stale"] = 1
+        body["vx"] = body["vy"] = 0.0
+        return [Stale(t, int(body["label"]))]
+
+    def _seated(self, body: Any) -> bool:
+        return self._seats.distance(body["ax"], body["ay"]) < _SEAT_M
+
+    def _outside(self, body: Any) -> bool:
+        x, y = float(body["x"]), float(body["y"])
+        if self._gates.polygons:
+            return self._gates.distance(x, y) < 0.3
+        return bool(self._region.polygons) and self._region.distance(x, y) > 0.0
+
+    def _confirm(self, index: int, t: float, new_label: Callable[[], int]) -> list[FloorEvent]:
+        body = self.bodies[index]
+        robot = self._is_robot(body)
+        old = self._missing(body)
+        if old is not None:
+            stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
+            old["used"] = 0
+            body["confirmed"], body["label"], body["first"] = 1, label, first
+            body["robot"] = old["robot"]
+            _told(body, t)
+            return [Back(t, label, _xy(body))] if stale else [Moved(t, label, _xy(body), _cov(body))]
+        if body["from_furniture"]:
+            return []
+        body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
+        _told(body, t)
+        width = float(body["width"])
+        since = float(body["first"])
+        return [Appeared(t, int(body["label"]), "mover", _xy(body), _cov(body), robot, since, (), width)]
+
+    def _is_robot(self, body: Any) -> bool:
+        if self._robots:
+            least = min(size[0] for size in self._robots)
+            most = max(math.hypot(*size) for size in self._robots)
+            return bool(0.7 * least < body["far"] < 1.2 * most and body["wide"] > 0.3)
+        return bool(body["wide"] > 0.5)
+
+    def _missing(self, body: Any) -> Any:
+        """The mover not seen now that this one most probably is: hidden, seated, or just lost."""
+        best, best_gap = None, 1.0
+        for other in self.bodies:
+            if not (other["used"] and other["confirmed"]):
+                continue
+            if other["seen"] > body["first"] + 0.2 and not _stuck(other, float(body["seen"])):
+                continue
+            since = max(0.0, float(body["first"] - other["seen"]))
+            gap = math.hypot(body["x0"] - other["x"], body["y0"] - other["y"])
+            reach = _OUT_M + min(_SPEED * since, 1.2)
+            if self._seated(other):
+                gap = min(gap, self._seats.distance(body["x0"], body["y0"]) + 0.05)
+                reach = 0.7
+            if gap / reach < best_gap:
+                best, best_gap = other, gap / reach
+        return best
+
+
+def _stuck(body: Any, t: float) -> bool:
+    """Whether all that is seen of a person is one thing that has not moved for long: it may be what was put down."""
+    a, b = t - body["a_seen"] < 0.5, t - body["b_seen"] < 0.5
+    if body["robot"] or a == b:
+        return False
+    return bool(t - (body["a_since"] if a else body["b_since"]) > 1.0)
+
+
+def _told(body: Any, t: float) -> None:
+    body["told_x"], body["told_y"], body["told_at"] = body["x"], body["y"], t
+
+
+def _xy(body: Any) -> tuple[float, float]:
+    return float(body["x"]), float(body["y"])
+
+
+def _cov(body: Any) -> tuple[float, float, float]:
+    # Two feet tell of the middle of a body by about 5 cm, however long they stand.
+    variance = float(body["pp"]) + 0.0025
+    return variance, 0.0, variance
