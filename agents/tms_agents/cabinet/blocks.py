@@ -18,6 +18,8 @@ from tms_agents.cabinet.settings import EstimatorSettings
 
 #: Probability that a cell repeats its last value: where learning begins, and its limits.
 _REPEAT_START, _REPEAT_LEAST, _REPEAT_MOST = 0.5, 0.15, 0.999
+#: A run of the same value that is so improbable (negative log) is suspect, though the cell may still be alive.
+_SUSPECT = 3.0
 
 
 @dataclass(slots=True)
@@ -48,11 +50,13 @@ class Blocks:
         self._last = [math.nan] * cells
         self._run = [0] * cells
         self._repeat = [_REPEAT_START] * cells
+        #: When each cell began to show its last value.
+        self._same_since = [math.inf] * cells
 
     def push(self, t: float, grams: Array) -> tuple[Block, Array] | None:
         """Take one sample (k,); a finished block, and its samples (n + 2, k) with the two before them."""
         values = grams.tolist()
-        self.unusable = self._check(values)
+        self.unusable = self._check(t, values)
         if self.unusable:
             self._samples.clear()
             self._before.clear()
@@ -71,7 +75,14 @@ class Blocks:
         self._samples.clear()
         return block, samples
 
-    def _check(self, values: list[float]) -> tuple[int, ...]:
+    def frozen(self, since: float) -> bool:
+        """Whether a cell has shown nothing but one value from ``since`` on, though it is too early to call it stuck."""
+        return any(
+            same <= since and run * _surprise(repeat) > _SUSPECT
+            for same, run, repeat in zip(self._same_since, self._run, self._repeat, strict=True)
+        )
+
+    def _check(self, t: float, values: list[float]) -> tuple[int, ...]:
         if len(values) != self._cells:
             raise ValueError(f"{len(values)} values for {self._cells} cells")
         settings, bad = self._settings, []
@@ -86,7 +97,9 @@ class Blocks:
                 continue
             run = self._run[i] = self._run[i] + 1 if value == self._last[i] else 0
             self._last[i] = value
-            surprise = -math.log(min(max(self._repeat[i], _REPEAT_LEAST), _REPEAT_MOST))
+            if not run:
+                self._same_since[i] = t
+            surprise = _surprise(self._repeat[i])
             together, shortest = together + surprise, min(shortest, run)
             if run * surprise > patience:
                 bad.append(i)
@@ -95,3 +108,8 @@ class Blocks:
         if shortest * together > patience:
             return tuple(range(self._cells))
         return tuple(bad)
+
+
+def _surprise(repeat: float) -> float:
+    """Negative log of how probable it is that a cell repeats its last value."""
+    return -math.log(min(max(repeat, _REPEAT_LEAST), _REPEAT_MOST))

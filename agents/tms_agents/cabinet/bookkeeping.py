@@ -152,11 +152,11 @@ class Bookkeeper:
         weight_g = (stood * at.weight_g - missing * step.weight_g) / (stood + missing)
         return Vanished(step.now, thing.id, weight_g, math.sqrt(1 / (stood + missing)))
 
-    def rest(self, now: float, level: Array, variance: Array) -> list[CabinetEvent]:
-        """The load rests at ``level``: sharpen the thing that was put last."""
+    def rest(self, now: float, level: Array, variance: Array, since: float) -> list[CabinetEvent]:
+        """The load has rested at ``level`` from ``since`` on: sharpen the thing that was put last."""
         settling = self.settling
-        if settling is None or now - settling.posted > self._settings.refine_until_s:
-            return []
+        if settling is None or now - settling.posted > self._settings.refine_until_s or since > settling.posted:
+            return []  # or another change has come, which was not its
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
         if settling.way is not None and settling.placed is not None:

@@ -20,7 +20,8 @@ class Continuity:
 
     ``interrupted`` is called when the device stopped delivering. The first ``settle_s`` seconds after that are held
     back. The zero is corrected where their median differs from the level before by at most ``small_g`` in every cell
-    and 20 g in sum, or, for a device that ``zeroes_itself`` at power-on, where it shows about nothing at all. Any other difference is what people did meanwhile, and is left to the estimator.
+    and 20 g in sum, or, for a device that ``zeroes_itself`` at power-on, where it shows about nothing at all. Any
+    other difference is what people did meanwhile, and is left to the estimator.
     """
 
     def __init__(

@@ -160,7 +160,7 @@ class CabinetEstimator:
         level, variance, seconds = self._detector.resting_level()
         if seconds <= 0:
             return []
-        events = self._book.rest(t, level, variance)
+        events = self._book.rest(t, level, variance, self._detector.since)
         if seconds < _BALANCE_S:
             return events
         if self._settings.knows_places:
@@ -193,6 +193,9 @@ class CabinetEstimator:
 
     def _explain(self, step: Step) -> list[CabinetEvent]:
         final = self._detector.is_final(step)
+        if self._blocks.frozen(step.settled):
+            self._detector.ignore(step) if final else self._detector.hold(step)
+            return []
         steady = step.now - step.settled
         waited = math.inf if final else steady
         whole = self._whole(step)

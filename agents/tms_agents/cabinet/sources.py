@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tms_agents.config import Section
 from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
@@ -21,44 +21,11 @@ from tms_agents.devices.modbus import (
     modbus_tcp,
 )
 from tms_agents.devices.scales import DIALECTS, DialectName, LoadGroup, Mode, ScaleLineSession
-from tms_agents.devices.transport import Link, Opener, Session, serial, tcp
-from tms_agents.readers import Port
-
-Baud = Annotated[int, Field(ge=300, le=4_000_000)]
+from tms_agents.devices.transport import Link, Opener, Session
+from tms_agents.line_config import Line
 
 
-class _Line(Section):
-    """A serial device (``device``, ``baud``) or the same behind a TCP converter (``host``, ``port``)."""
-
-    device: str | None = None
-    baud: Baud | None = None
-    host: str | None = None
-    port: Port | None = None
-
-    default_port: ClassVar[int | None] = None
-
-    @model_validator(mode="after")
-    def _one_way(self) -> _Line:
-        if (self.device is None) == (self.host is None):
-            raise ValueError("give either device (serial) or host and port (TCP)")
-        if self.host is not None and self.port is None and self.default_port is None:
-            raise ValueError("host needs port")
-        if self.host is not None and self.baud is not None:
-            raise ValueError("baud belongs to a serial device, not to host")
-        return self
-
-    @property
-    def place(self) -> str:
-        return self.device or f"{self.host}:{self.port or self.default_port}"
-
-    def opener(self, baud: int, *, bits: int = 8, parity: str = "N") -> Opener:
-        if self.device is not None:
-            return serial(self.device, self.baud or baud, bits=bits, parity=parity)
-        assert self.host is not None and self.port is not None
-        return tcp(self.host, self.port)
-
-
-class RosTmsBoard(_Line):
+class RosTmsBoard(Line):
     """The board of the ROS-TMS laboratory: a character per cell asks, a line with the counts answers."""
 
     kind: Literal["ros-tms"]
@@ -87,7 +54,7 @@ class RosTmsBoard(_Line):
         return RosTmsBoardSession if self.ask == "one" else RosTmsBoardBurst
 
 
-class Scale(_Line):
+class Scale(Line):
     """A scale that prints lines: one cell, in grams."""
 
     kind: Literal["openscale", "and", "mt-sics"]
@@ -132,7 +99,7 @@ class StatusSection(Section):
         return StatusRegister(**values, faults={int(mask, 0): text for mask, text in self.faults.items()})
 
 
-class ModbusModule(_Line):
+class ModbusModule(Line):
     """A weighing module, RTU (``device``) or TCP (``host``, ``port`` 502); ``registers``: the first of each cell."""
 
     kind: Literal["modbus"]

@@ -69,6 +69,8 @@ class StepDetector:
         self._history: deque[Block] = deque(maxlen=_HISTORY_BLOCKS)
         self._loudness = Loudness()
         self._resting_blocks = 0
+        #: Since when the load rests at its level, or rested there last.
+        self.since = 0.0
         self._changed: list[Block] | None = None
         self._offered: tuple[Step, list[Block]] | None = None
         self._whole_limit = chi_square_limit(settings.departure_sd, cells) / settings.departure_sd**2
@@ -95,12 +97,6 @@ class StepDetector:
         for block in list(self._recent)[:-1]:
             level.add(block)
         return level.mean, level.variance, level.seconds
-
-    def forget_before(self, since: float) -> None:
-        """The load that rests now was still on its way before ``since``."""
-        blocks = [block for block in self._history if block.start >= since - 1e-9]
-        if self._changed is None and len(self._history) > len(blocks) >= _LEAST_BLOCKS:
-            self._start_resting(blocks)
 
     def interrupt(self) -> None:
         """Samples are missing from here on, and the newest ones are not to be believed: look at the level afresh."""
@@ -178,6 +174,7 @@ class StepDetector:
         self._recent = deque(blocks[half:])
         self._history = deque(blocks, maxlen=_HISTORY_BLOCKS)
         self._resting_blocks = len(blocks)
+        self.since = blocks[0].start
         self._changed, self._offered = None, None
 
     # --- while it changes

@@ -158,6 +158,20 @@ def test_faults_of_cells_tell_nothing(fault: str) -> None:
     assert vanished.stay == before[0].id
 
 
+@pytest.mark.parametrize("period_s", [0.05, 0.1, 0.15])
+def test_a_stuck_cell_of_a_slow_board_tells_nothing(period_s: float) -> None:
+    """Few samples tell late that a cell is stuck, and a load that does not move looks steady at once."""
+    rng = np.random.default_rng(25)
+    estimator = CabinetEstimator(GEOMETRY, zones=ZONES)
+    for i in range(600):
+        grams = 500 * share(0.1, 0.2) + rng.normal(0, 2, 4)
+        if 300 <= i < 400:
+            grams[1] = 777.0
+        events = estimator.load(i * period_s, grams)
+        assert events == [] or i < 300
+    assert estimator.unusable_cells == ()
+
+
 def test_vibration_and_radio_noise_tell_nothing() -> None:
     bench = Bench(seed=21)
     assert bench.run(20.0, lambda s: 20 * np.sin(2 * np.pi * 17.3 * s + np.arange(4)) * (s % 7 < 3)) == []
