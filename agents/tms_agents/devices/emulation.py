@@ -11,10 +11,13 @@ import contextlib
 import os
 import pty
 import tempfile
+import termios
 import tty
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Protocol, runtime_checkable
+
+_RATES = (9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 921600)
 
 
 class EmulatedDevice(Protocol):
@@ -65,6 +68,12 @@ class PtyLine(_Line):
         super().__init__(device, tick_s)
         self.path = ""
         self._ends: tuple[int, int] | None = None
+
+    @property
+    def baud(self) -> int:
+        """The rate that the host has set; 0 where it is none of the usual ones, or the cable is out."""
+        speed = termios.tcgetattr(self._ends[0])[4] if self._ends else 0
+        return next((rate for rate in _RATES if speed == getattr(termios, f"B{rate}", None)), 0)
 
     def inject(self, data: bytes) -> None:
         with contextlib.suppress(BlockingIOError):

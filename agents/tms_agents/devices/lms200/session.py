@@ -188,7 +188,7 @@ class Lms200Session(Outgoing):
         if self._current is not None:
             return
         if not self._steps and self._output_kind == "request":
-            self._steps.append(_Step(m.request_scan(), "scan", _SWITCH_S, lambda _: None))
+            self._steps.append(_Step(m.request_scan(), "scan", _REPLY_S, lambda _: None))
         if self._steps:
             self._current, self._tries = self._steps.popleft(), 0
             self._output += self._encode(self._current.body)
