@@ -11,6 +11,7 @@ seed and the bytes, where anything fails.
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import random
 import sys
@@ -21,6 +22,8 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tms_agents.devices.lines import LineParser
 from tms_agents.devices.llrp.codec import MAX_MESSAGE
 from tms_agents.devices.llrp.codec import FrameParser as LlrpParser
@@ -29,6 +32,11 @@ from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.modbus import StatusRegister, WeighingMap
 from tms_agents.devices.scales import DialectName, ScaleLineSession
 from tms_agents.devices.scanner import ScannerSession
+from tms_agents.devices.scip import MODELS, Measure, ScipSession, ScipSettings
+from tms_agents.devices.scip import ReplyParser as ScipParser
+from tms_agents.devices.scip import measurement as scip_measurement
+from tms_agents.devices.scip import wording as scip
+from tms_agents.devices.scip.frames import MAX_REPLY
 from tms_agents.devices.text_reader import Rdm6300Parser, TextReaderSession
 from tms_agents.devices.thingmagic.codec import ReplyParser
 from tms_agents.devices.thingmagic.session import ThingMagicSession
@@ -145,6 +153,36 @@ _SCALES: dict[DialectName, list[bytes]] = {
 _LONGEST_TEXT = 200
 
 
+def _scip(name: str, request: Measure) -> list[bytes]:
+    """What a Hokuyo sensor says: when it is set up, while it measures, of its faults; all at once."""
+    model = MODELS[name]
+    state = scip.state(model, laser_on=True, speed=model.parameters.scan, baud=19200, stamp_ms=4711, broken=False)
+    raw = np.arange(request.beams, dtype=np.int32) * 7 % 5000
+    scan = scip.stamp(4711) + scip.data(raw, raw if request.code[1] == "E" else None, request.width)
+    said = [
+        scip.reply("QT", "00"),
+        scip.reply("PP", "00", scip.fields(model.parameters.lines())),
+        scip.reply("VV", "00", scip.fields(scip.version(model))),
+        scip.reply("II", "00", scip.fields(state)),
+        scip.reply(request.encode(), "00"),
+        scip.reply(request.encode(), "99", scan),
+    ]
+    old = [b"QT\nE\n\n", b"SCIP2.0\n0\n\n", b"G04404701\n0\n0D0E0F0G\n\n"]
+    faults = [scip.reply("QT", "0E"), scip.reply(request.encode(), "51"), scip.reply("II", "0L")]
+    return [b"".join(said), b"".join(said), said[-1], *said, *old, *faults]
+
+
+def _scip_frames() -> Target:
+    parser = ScipParser()
+
+    def feed(data: bytes) -> None:
+        for reply in parser.feed(data):
+            scip_measurement(reply)
+
+    samples = _scip("UST-20LX", Measure("ME", 500, 560)) + _scip("URG-04LX", Measure("MS", 44, 100, 3))
+    return Target(feed, lambda: parser.pending, MAX_REPLY, samples)
+
+
 def _parser(make: Callable[[], Any], longest: int, samples: Sequence[bytes]) -> Callable[[], Target]:
     def target() -> Target:
         parser = make()
@@ -199,6 +237,28 @@ TARGETS: list[tuple[str, Callable[[], Target]]] = [
     _scale("and"),
     _scale("mt-sics"),
     ("modbus registers", _registers),
+    ("scip frames", _scip_frames),
+    (
+        "scip session",
+        _session(
+            lambda clock: ScipSession(reply_s=5.0, stall_s=5.0, clock=clock),
+            MAX_REPLY,
+            _scip("UST-20LX", Measure("ME", 0, 1080)),
+        ),
+    ),
+    (
+        "scip 2-character session",
+        _session(
+            lambda clock: ScipSession(
+                ScipSettings(short=True, angle_min=-0.5, angle_max=0.5, cluster=3),
+                reply_s=5.0,
+                stall_s=5.0,
+                clock=clock,
+            ),
+            MAX_REPLY,
+            _scip("URG-04LX", Measure("MS", 303, 465, 3)),
+        ),
+    ),
 ]
 
 
@@ -270,11 +330,13 @@ def _growth(target: Target, source: Iterator[bytes], count: int) -> int:
         before = 0
         for i in range(count):
             if i == count // 10:
+                gc.collect()  # empties the interpreter's lists of spare objects, which are no growth
                 before = tracemalloc.get_traced_memory()[0]
             try:
                 target.feed(next(source))
             except DeviceFault:
                 continue
+        gc.collect()
         return tracemalloc.get_traced_memory()[0] - before
     finally:
         tracemalloc.stop()
