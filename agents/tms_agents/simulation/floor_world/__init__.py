@@ -18,7 +18,7 @@ from tms_agents.simulation.floor_world.furnishing import Home, Setting, furnish
 from tms_agents.simulation.floor_world.lasers import COARSE, FINE, LASERS, Laser, Mount, NoiseParameters
 from tms_agents.simulation.floor_world.room import Furniture, LiveRoom, Robot, Thing, Wall
 from tms_agents.simulation.floor_world.scenarios import SCENARIOS, Scenario
-from tms_agents.simulation.floor_world.world import FloorWorld, Frame, write
+from tms_agents.simulation.floor_world.world import FloorWorld, Frame, Known, write
 
 #: Seeds from here on are for reports only.
 UNSEEN = 1000
@@ -33,6 +33,7 @@ __all__ = [
     "Frame",
     "Furniture",
     "Home",
+    "Known",
     "Laser",
     "LiveRoom",
     "Mount",

@@ -79,6 +79,12 @@ class Plan:
             walls += [Wall((near, -12.0), (near, 0.0)), Wall((near, self.depth), (near, self.depth + 12.0))]
         return walls
 
+    def gate(self, door: Door) -> list[Xy]:
+        """Half a metre on both sides of an opening."""
+        x = self.width if door.wall == "e" else 0.0
+        low, high = door.y - door.width / 2, door.y + door.width / 2
+        return [(x - 0.5, low), (x + 0.5, low), (x + 0.5, high), (x - 0.5, high)]
+
     def outside(self, door: Door, rng: np.random.Generator) -> Xy:
         """A place in the corridor, out of sight of most of the room."""
         x = self.width + CORRIDOR / 2 if door.wall == "e" else -CORRIDOR / 2

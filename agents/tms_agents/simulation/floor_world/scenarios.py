@@ -16,7 +16,8 @@ from tms_agents.simulation.floor_world.tasks import Drag, Face, Go, Story, Wait
 
 #: Nobody is in the room before, so that a background can be learnt.
 QUIET_S = 8.0
-_ROBOT = (0.55, 0.42)
+#: Length and width.
+ROBOT_SIZE = (0.55, 0.42)
 _USUAL, _LARGE = Setting(), Setting(doors=2, spacious=True)
 
 
@@ -36,13 +37,13 @@ def _come_in(life: Life, i: int = 0) -> Xy:
     return life.plan.outside(doors[i % len(doors)], life.rng)
 
 
-def _crossing(people: int) -> Callable[[Life, float], None]:
+def _crossing(people: int, eager: float) -> Callable[[Life, float], None]:
     def write(life: Life, duration: float) -> None:
         for i in range(people):
             until = duration - life.rng.uniform(0, 12)
 
             def story(me: Mover, until: float = until) -> Story:
-                yield from cross(life, me, until)
+                yield from cross(life, me, until, eager)
                 yield from leave(life, me)
 
             life.person(f"p{i + 1}", QUIET_S + life.rng.uniform(0, 1.5) + 2.2 * i, _come_in(life, i), story)
@@ -148,7 +149,7 @@ def _hidden(life: Life, duration: float) -> None:
 
     life.person("p1", QUIET_S + 1, _come_in(life), porter)
     life.person("p2", QUIET_S + 14, _come_in(life), visitor)
-    life.robot("r1", QUIET_S + 30, _come_in(life), machine, _ROBOT)
+    life.robot("r1", QUIET_S + 30, _come_in(life), machine, ROBOT_SIZE)
 
 
 def _start(life: Life, duration: float) -> None:
@@ -251,7 +252,7 @@ def _robots(life: Life, duration: float) -> None:
         yield from leave(life, me)
 
     for i in range(2):
-        life.robot(f"r{i + 1}", QUIET_S + 1 + 12 * i, _come_in(life), machine, _ROBOT)
+        life.robot(f"r{i + 1}", QUIET_S + 1 + 12 * i, _come_in(life), machine, ROBOT_SIZE)
         life.person(f"p{i + 1}", QUIET_S + 5 + 9 * i, _come_in(life), person)
 
 
@@ -262,7 +263,7 @@ def _parts(life: Life, duration: float) -> None:
         name = f"o{me.id[1:]}"
         yield from wander(life, me, life.now + 5)
         yield from put(life, me, new_thing(life, float(me.rng.choice([0.05, 0.08, 0.15])), name))
-        yield from cross(life, me, duration - 45)
+        yield from cross(life, me, duration - 45, 0.4)
         yield from pick(life, me, name)
         yield from leave(life, me)
 
@@ -295,7 +296,7 @@ def _crowd(life: Life, duration: float) -> None:
             if left:
                 name, size = left.pop()
                 yield from put(life, me, new_thing(life, size, name))
-        yield from cross(life, me, duration)
+        yield from cross(life, me, duration, 0.4)
 
     def machine(me: Mover) -> Story:
         while life.now < duration:
@@ -305,13 +306,14 @@ def _crowd(life: Life, duration: float) -> None:
     for i in range(8):
         life.person(f"p{i + 1}", QUIET_S + 1.5 * i, _come_in(life, i), person)
     for i in range(2):
-        life.robot(f"r{i + 1}", QUIET_S + 14 + 8 * i, _come_in(life, i), machine, _ROBOT)
+        life.robot(f"r{i + 1}", QUIET_S + 14 + 8 * i, _come_in(life, i), machine, ROBOT_SIZE)
 
 
 SCENARIOS: dict[str, Scenario] = {
-    "one": Scenario(description="one walker", duration=60, write=_crossing(1)),
-    "three": Scenario(description="three walkers cross within half a metre", duration=100, write=_crossing(3)),
-    "eight": Scenario(description="eight walkers", duration=90, write=_crossing(8), setting=_LARGE),
+    "one": Scenario(description="one walker", duration=60, write=_crossing(1, 0.0)),
+    "three": Scenario(description="three walkers cross within half a metre", duration=100, write=_crossing(3, 0.4)),
+    "three close": Scenario(description="three walkers at close quarters", duration=100, write=_crossing(3, 1.0)),
+    "eight": Scenario(description="eight walkers", duration=90, write=_crossing(8, 0.4), setting=_LARGE),
     "things": Scenario(description="things of 3 to 15 cm come and go", duration=260, write=_things),
     "near wall": Scenario(description="things less than 10 cm before a wall", duration=260, write=_near_wall),
     "glossy": Scenario(description="black and glossy things", duration=220, write=_glossy),

@@ -22,14 +22,12 @@ def wander(life: Life, me: Mover, until: float, pause: float = 0.4) -> Story:
             yield Wait(me.rng.uniform(0.5, 7.0))
 
 
-def cross(life: Life, me: Mover, until: float) -> Story:
-    """Wander, mostly past somebody else, at less than half a metre if there is room."""
+def cross(life: Life, me: Mover, until: float, eager: float) -> Story:
+    """Wander; this share of the ways leads past somebody else, at less than half a metre."""
     while life.now < until:
         others = [other for other in life.others(me) if life.plan.contains(other.xy, 0.2)]
         goal = life.random_place()
-        for _ in range(8):
-            if not others or me.rng.random() < 0.1:
-                break
+        for _ in range(8 if others and me.rng.random() < eager else 0):
             other = others[me.rng.integers(len(others))]
             soon = math.dist(me.xy, other.xy) / (me.speed + 1.0)  # where they will meet
             meet = (other.xy[0] + soon * other.velocity[0], other.xy[1] + soon * other.velocity[1])
@@ -39,8 +37,8 @@ def cross(life: Life, me: Mover, until: float) -> Story:
                 goal = past
                 break
         yield Go(goal)
-        if me.rng.random() < 0.25:
-            yield Wait(me.rng.uniform(0.5, 5.0))
+        if me.rng.random() < 0.3:
+            yield Wait(me.rng.uniform(0.5, 6.0))
 
 
 def leave(life: Life, me: Mover) -> Story:

@@ -14,8 +14,8 @@ from tms_agents.simulation.floor_world.furnishing import furnish, live_room
 from tms_agents.simulation.floor_world.gait import FeetKind
 from tms_agents.simulation.floor_world.lasers import FINE, Laser, Mount
 from tms_agents.simulation.floor_world.life import Life
-from tms_agents.simulation.floor_world.scenarios import SCENARIOS
-from tms_agents.simulation.floor_world.shapes import Floats
+from tms_agents.simulation.floor_world.scenarios import ROBOT_SIZE, SCENARIOS
+from tms_agents.simulation.floor_world.shapes import Floats, Xy, box_corners
 from tms_agents.simulation.floor_world.truth import Witness
 
 
@@ -27,6 +27,17 @@ class Frame:
     t: float
     ranges: Floats
     intensities: Floats
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Known:
+    """What an installer knows of the room and may tell an estimator: polygons, segments, (width, length) of robots."""
+
+    region: list[Xy]
+    gates: list[list[Xy]]
+    seats: list[list[Xy]]
+    mirrors: list[tuple[Xy, Xy]]
+    robots: list[tuple[float, float]]
 
 
 class FloorWorld:
@@ -60,6 +71,18 @@ class FloorWorld:
     def sensors(self) -> dict[str, Mount]:
         """By name, with the poses as reported to the user (and the true ones, which are none of his business)."""
         return self.room.mounts
+
+    def known(self) -> Known:
+        """The plan of the room, where the bed stands, the robots of the house."""
+        plan = self.life.plan
+        bed = self.room.furniture["bed"]
+        return Known(
+            region=plan.outline(),
+            gates=[plan.gate(door) for door in plan.doors],
+            seats=[box_corners(bed.pose, bed.width, bed.depth)],
+            mirrors=[(wall.a, wall.b) for wall in self.room.walls if wall.material.mirror],
+            robots=[ROBOT_SIZE],
+        )
 
     def scans(self) -> Iterator[Frame]:
         """Play it."""
