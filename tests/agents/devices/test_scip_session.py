@@ -104,6 +104,21 @@ def test_scans_that_are_asked_for(model, options, command):
     assert {command, "BM"} <= set(sensor.device.heard) and sensor.device.state == "single"
 
 
+def test_a_slow_line_carries_only_what_is_asked_for():
+    """19200 baud: a short scan takes 0.7 s, and nobody takes that for silence."""
+    sensor, waiting = Sensor("URG-04LX", ScipSettings(polled=True, short=True)), bytearray()
+
+    def slow(said: bytes) -> bytes:
+        waiting.extend(said)
+        out = bytes(waiting[:10])  # in 5 ms
+        del waiting[:10]
+        return out
+
+    scans = sensor.scans(10.0, line=slow)
+    assert 10 <= len(scans) <= 14 and all(sensor.is_seen(scan) for scan in scans)
+    assert len(waiting) < 1500 and sensor.device.heard.count("QT") == 2
+
+
 def test_a_sensor_that_knows_only_scip_1_1():
     sensor = Sensor("URG-04LX")
     sensor.device.refuse["SC"] = "E"
