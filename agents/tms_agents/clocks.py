@@ -30,6 +30,11 @@ class Clocks:
         return datetime.fromtimestamp(self._latest, UTC)
 
     @property
+    def shift_s(self) -> float:
+        """What makes a sensor time of the past a Unix time, in step with the times that were told already."""
+        return self._unix() + self.ahead_s - self.now()
+
+    @property
     def ahead_s(self) -> float:
         """How far the last time that was told is ahead of the clock, seconds; 0 unless the clock was set back."""
         return max(0.0, self._latest - self._unix())

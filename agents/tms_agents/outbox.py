@@ -20,8 +20,6 @@ from tms_schemas.observation import Inventory, Observation
 
 log = logging.getLogger(__name__)
 _LOOK_S = 0.2
-#: Between two times that the state is saved.
-_SAVE_PAUSE_S = 0.1
 _SAVE_S = 60.0
 #: After a device came back, what changed meanwhile has been told by then.
 _SETTLED_S = 2.0
@@ -32,7 +30,9 @@ class Outbox:
     """Takes observations from any callback of the event loop; ``work`` does the rest until it is cancelled.
 
     ``inventory`` and ``memory`` (what is kept across restarts, for ``state_file``) are asked for when they are needed;
-    ``states`` tells how the devices are. What finds no room in the queue or the spool is made good by an inventory.
+    ``states`` tells how the devices are. The memory is saved after every batch that is ``worth_saving``, with a pause
+    of ``save_pause_s`` between, and once a minute. What finds no room in the queue or the spool is made good by an
+    inventory.
     """
 
     def __init__(
@@ -46,10 +46,13 @@ class Outbox:
         inventory: Callable[[], Inventory | Awaitable[Inventory]],
         states: Callable[[], Mapping[str, DeviceState]],
         memory: Callable[[], dict[str, Any] | Awaitable[dict[str, Any]]],
+        save_pause_s: float = 0.1,
+        worth_saving: Callable[[list[Observation]], bool] = lambda batch: True,
     ) -> None:
         self._agent, self._clocks, self._name, self._file = agent, clocks, name, state_file
         self._heartbeat_s = heartbeat_s
         self._inventory, self._states, self._memory = inventory, states, memory
+        self._save_pause_s, self._worth_saving = save_pause_s, worth_saving
         self._queue: asyncio.Queue[list[Observation]] = asyncio.Queue(_OUTBOX)
         self._told: dict[str, DeviceState] = {}
         self._inventory_at: float | None = None
@@ -101,7 +104,8 @@ class Outbox:
             batch = await self._queue.get()
             if not await self._agent.observations(*batch):
                 self._lost()
-            self._dirty.set()
+            if self._worth_saving(batch):
+                self._dirty.set()
 
     async def _save(self) -> None:
         """After every event, and now and then for what is learnt meanwhile."""
@@ -112,7 +116,7 @@ class Outbox:
             self._dirty.clear()
             state = await _now(self._memory())
             await asyncio.to_thread(save_state, self._file, self._name, state)
-            await asyncio.sleep(_SAVE_PAUSE_S)
+            await asyncio.sleep(self._save_pause_s)
 
     def _lost(self) -> None:
         """An event never reached the spool: say what is there instead, until that is taken."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -10,12 +9,11 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AwareDatetime, Field, ValidationError, model_validator
+from pydantic import AwareDatetime, Field, model_validator
 
 from tms_agents.cabinet.calibration import Solution
+from tms_agents.calibration_tables import read_tables, write_tables
 from tms_agents.config import Section
-from tms_agents.files import write_atomically
-from tms_client.cli import CommandError
 from tms_schemas.base import Xy
 
 _Values = Annotated[list[float], Field(min_length=1, max_length=36)]
@@ -66,20 +64,7 @@ def read_calibration(path: Path) -> dict[str, BoardCalibration]:
     Raises:
         CommandError: the file cannot be read or says something impossible.
     """
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise CommandError(f"{path}: {error}") from error
-    found: dict[str, BoardCalibration] = {}
-    for name, values in raw.items():
-        try:
-            found[name] = BoardCalibration.model_validate(values)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            raise CommandError(f"{path}: {'.'.join(map(str, (name, *first['loc'])))}: {first['msg']}") from error
-    return found
+    return read_tables(path, BoardCalibration)
 
 
 def write_calibration(path: Path, boards: Mapping[str, BoardCalibration]) -> Path | None:
@@ -88,37 +73,7 @@ def write_calibration(path: Path, boards: Mapping[str, BoardCalibration]) -> Pat
     Raises:
         CommandError: the folder cannot be written.
     """
-    text = "# grams = gain * (counts - offset) per cell; written by tms cabinet calibrate\n" + "".join(
-        f"\n[{_quoted(name)}]\n{_table(board)}" for name, board in boards.items()
-    )
-    old = path.with_name(path.name + ".old")
-    try:
-        if path.exists():
-            write_atomically(old, path.read_bytes())
-        else:
-            old = None  # type: ignore[assignment]
-        write_atomically(path, text.encode())
-    except OSError as error:
-        raise CommandError(f"{path}: {error.strerror}") from error
-    return old
-
-
-def _table(board: BoardCalibration) -> str:
-    values = board.model_dump(exclude_none=True)
-    lines = []
-    for name, value in values.items():
-        if isinstance(value, datetime):
-            text = value.isoformat(timespec="seconds")
-        elif isinstance(value, list):
-            text = f"[{', '.join(str(list(one)) if isinstance(one, tuple) else repr(one) for one in value)}]"
-        else:
-            text = repr(value)
-        lines.append(f"{name} = {text}\n")
-    return "".join(lines)
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return write_tables(path, boards, "grams = gain * (counts - offset) per cell; written by tms cabinet calibrate")
 
 
 def _rounded(values: NDArray[np.float64]) -> list[float]:

@@ -32,6 +32,7 @@ def main(argv: Sequence[str]) -> int:
         "--timeout", type=float, default=60.0, metavar="S", help="with --once: wait this long for the server"
     )
     _kind(kinds, "cabinet", "smart cabinet: boards with load cells or scales, and tag readers", _cabinet)
+    _kind(kinds, "floor", "lasers over the floor: Hokuyo SCIP, SICK LMS2xx, TiM, LMS1xx, LMS5xx", _floor)
     arguments = parser.parse_args(argv)
     done: int = arguments.work(arguments)
     return done
@@ -63,6 +64,22 @@ def _cabinet(arguments: argparse.Namespace) -> int:
     calibrations = read_calibration(config.calibration_path(arguments.config))
     require_calibration(config, calibrations)
     _run(config, run_cabinet(config, calibrations, drain_s=_STOP_S))
+    return 0
+
+
+def _floor(arguments: argparse.Namespace) -> int:
+    try:
+        from tms_agents.floor.calibration_file import read_poses
+        from tms_agents.floor.config import FloorConfig
+        from tms_agents.floor.runner import run as run_floor
+    except ImportError as error:
+        if error.name is None or error.name.startswith("tms_"):
+            raise
+        raise CommandError(f'the floor agent needs {error.name}: pip install "robot-town-tms[slam]"') from error
+
+    config = read_config(arguments.config, FloorConfig)
+    found = read_poses(config.calibration_path(arguments.config))
+    _run(config, run_floor(config, {name: one.pose for name, one in found.items()}, drain_s=_STOP_S))
     return 0
 
 

@@ -54,6 +54,8 @@ class ScanWriter:
             raise
         self._numbers: dict[str, tuple[Sweep, Pose, int, float]] = {}
         self._waiting: dict[str, list[tuple[float, Scan]]] = {}
+        #: Scans taken so far.
+        self.written = 0
 
     @property
     def size(self) -> int:
@@ -68,6 +70,7 @@ class ScanWriter:
             self._describe(sensor, pose, scan.sweep)
         waiting = self._waiting.setdefault(sensor, [])
         waiting.append((t, scan))
+        self.written += 1
         if len(waiting) >= BLOCK_SCANS or t - waiting[0][0] >= BLOCK_S:
             self._write(sensor)
             self.flush()

@@ -1,0 +1,101 @@
+"""``tms floor replay``: recordings in, labels after every scan out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace as changed
+from pathlib import Path
+from typing import Any
+
+from tms_agents.config import read_config
+from tms_agents.floor.calibration_file import read_poses
+from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.formats import Recorded, read_scans
+from tms_agents.floor.picture import tracks_png
+from tms_agents.floor.replay import Replay, tracks
+from tms_agents.floor.settings import Pose
+from tms_agents.floor.watching import config_of, play
+from tms_client.cli import CommandError
+
+
+def replay(arguments: argparse.Namespace) -> int:
+    config, recordings = recordings_of(arguments)
+    try:
+        run = Replay(recordings, config.settings(), config.room_scene())
+        frames = run.frames(_progress(run.scans))
+    except ValueError as error:
+        raise CommandError(f"{', '.join(map(str, arguments.scans))}: {error}") from error
+    write_file(arguments.out, (json.dumps(frames, allow_nan=False) + "\n").encode())
+    if arguments.png is not None:
+        write_file(arguments.png, tracks_png(_walls(recordings, config), tracks(frames)))
+    return 0
+
+
+def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Recorded]]:
+    """Recordings, each with a name of its own and the pose that is given for it, and how to look at them.
+
+    Raises:
+        CommandError: a file, the configuration or a pose cannot be used.
+    """
+    like = None if arguments.config is None else read_config(arguments.config, FloorConfig)
+    poses = {} if like is None else poses_of(like, arguments.config)
+    recordings: list[Recorded] = []
+    for one in [one for path in arguments.scans for one in read_scans(path)]:
+        name, count = one.name, 2
+        while name in [other.name for other in recordings]:
+            name, count = f"{one.name} {count}", count + 1
+        recordings.append(changed(one, name=name, pose=poses.get(one.name, one.pose)))
+    if arguments.pose:
+        given = [_pose(text) for text in arguments.pose]
+        if len(given) != len(recordings):
+            names = ", ".join(one.name for one in recordings)
+            raise CommandError(f"--pose is given {len(given)} times, there are {len(recordings)} sensors: {names}")
+        recordings = [changed(one, pose=pose) for one, pose in zip(recordings, given, strict=True)]
+    config = config_of(recordings, like)
+    if arguments.feet is not None:
+        config = config.model_copy(update={"feet": arguments.feet})
+    return config, recordings
+
+
+def poses_of(config: FloorConfig, path: Path) -> dict[str, Pose]:
+    """Poses of the lasers by name: calibrated ones, otherwise those of the configuration."""
+    found = read_poses(config.calibration_path(path))
+    return {one.name: found[one.name].pose if one.name in found else one.pose.pose for one in config.lasers}
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Raises CommandError where that cannot be."""
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise CommandError(f"{path}: {error.strerror}") from error
+
+
+def _pose(text: str) -> Pose:
+    try:
+        x, y, theta = map(float, text.split(","))
+    except ValueError:
+        raise CommandError(f"--pose {text!r}: it is x,y,theta (metres, radians)") from None
+    return (x, y, theta)
+
+
+def _walls(recordings: Sequence[Recorded], config: FloorConfig) -> dict[str, Any]:
+    """The view at the end of recordings."""
+    view: dict[str, Any] = {}
+    for _, shown in play(recordings, config, every_s=1.0):
+        view = shown
+    return view
+
+
+def _progress(total: int) -> Callable[[int], None]:
+    if not sys.stderr.isatty():
+        return lambda done: None
+
+    def show(done: int) -> None:
+        if done % 50 == 0 or done == total:
+            sys.stderr.write(f"\r{done}/{total} scans" + ("\n" if done == total else ""))
+
+    return show

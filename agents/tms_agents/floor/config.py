@@ -1,0 +1,156 @@
+"""Configuration of ``tms agent floor``; examples for every device are in ``examples`` beside this file."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+
+from tms_agents.config import AgentConfig, LocalPath, Seconds, Section
+from tms_agents.floor.settings import FloorSettings, Pose, Scene
+from tms_agents.floor.sources import LaserSource
+from tms_agents.running import Heartbeat
+from tms_schemas.base import Metres, Polygon, Xy
+
+#: Names become parts of messages and tables.
+Short = Annotated[str, Field(pattern=r"^[^\x00-\x1f\"]{1,64}$")]
+_Length = Annotated[float, Field(gt=0, le=100)]
+
+
+class PoseSection(Section):
+    """Where a laser is in the room, metres, and where its 0 degrees look to, radians counter-clockwise from x."""
+
+    x: Metres
+    y: Metres
+    theta: Annotated[float, Field(ge=-6.2832, le=6.2832)] = 0.0
+
+    @property
+    def pose(self) -> Pose:
+        return (self.x, self.y, self.theta)
+
+
+class LaserSection(Section):
+    """A laser range finder; ``pose`` by ruler, which ``tms floor calibrate`` makes better.
+
+    ``upside_down``: mounted with its top to the floor, so that it sweeps clockwise.
+    """
+
+    name: Short = "laser"
+    source: LaserSource
+    pose: PoseSection
+    upside_down: bool = False
+    #: What is farther than this is not used.
+    range_max_m: _Length | None = None
+
+
+class SceneSection(Section):
+    """What is known of the room (``Scene``), in metres; everything may be left out."""
+
+    region: Polygon | None = None
+    #: Where people come in and go out.
+    gates: Annotated[list[Polygon], Field(max_length=50)] = []
+    #: Known furniture that is ignored, and what moves without being anybody.
+    masks: Annotated[list[Polygon], Field(max_length=200)] = []
+    #: Bed, chair: people are out of sight there without having left.
+    seats: Annotated[list[Polygon], Field(max_length=50)] = []
+    mirrors: Annotated[list[tuple[Xy, Xy]], Field(max_length=10)] = []
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _areas(cls, value: Any, info: ValidationInfo) -> Any:
+        polygons = [value] if info.field_name == "region" else value
+        if info.field_name != "mirrors" and any(one is not None and _area(one) < 1e-4 for one in polygons):
+            raise ValueError("a polygon without an area")
+        return value
+
+
+class RobotSection(Section):
+    """A robot's footprint as the laser sees it, metres. Robots report themselves; ``report``: this agent does, too."""
+
+    width: _Length
+    length: _Length
+    report: bool = False
+
+
+class RecordingSection(Section):
+    """Record every scan into ``path`` (NAME.scans); full, it becomes NAME.scans.old and a new one begins."""
+
+    path: LocalPath
+    max_mb: Annotated[float, Field(ge=1, le=1e6)] = 1000.0
+
+    @field_validator("path")
+    @classmethod
+    def _named(cls, value: Path) -> Path:
+        if value.suffix != ".scans":
+            raise ValueError("the name of a recording ends in .scans")
+        return value
+
+
+class FloorConfig(AgentConfig):
+    lasers: Annotated[list[LaserSection], Field(min_length=1, max_length=16)]
+    scene: SceneSection = SceneSection()
+    robots: Annotated[list[RobotSection], Field(max_length=16)] = []
+    #: What a person looks like: ``legs`` at the height of ankles, ``prints`` where a shoe is seen only while it stands.
+    feet: Literal["legs", "prints", "auto"] = "auto"
+    estimator: dict[str, float] = {}
+    #: A mover's place is told after this way or this time, whichever is first, and where it came to rest.
+    report_m: Annotated[float, Field(ge=0.02, le=10)] = 0.25
+    report_s: Seconds = 0.5
+    recording: RecordingSection | None = None
+    #: Where ``tms floor calibrate`` writes; default: NAME.calibration.toml beside the configuration NAME.toml.
+    calibration: LocalPath | None = None
+    #: A laser is called silent when no scan came for this long.
+    silent_after_s: Seconds = 1.0
+    #: The state of the devices is posted again this often, so that a quiet agent is not taken for a dead one.
+    heartbeat_s: Heartbeat = 10.0
+
+    @model_validator(mode="after")
+    def _fits(self) -> FloorConfig:
+        names = [one.name for one in self.lasers]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"two lasers are called {twice[0]!r}: give each its name")
+        self.room_scene()
+        self.settings()
+        return self
+
+    def room_scene(self) -> Scene:
+        """Of the estimator. Raises ValueError where no room is like that."""
+        one = self.scene
+        return Scene(
+            region=one.region,
+            gates=tuple(one.gates),
+            masks=tuple(one.masks),
+            seats=tuple(one.seats),
+            mirrors=tuple(one.mirrors),
+            robots=tuple((robot.width, robot.length) for robot in self.robots),
+        )
+
+    def settings(self) -> FloorSettings:
+        tuned = _Settings.model_validate(self.estimator).model_dump(exclude_unset=True)
+        return FloorSettings(feet=self.feet, **tuned)
+
+    @property
+    def tells_robots(self) -> bool:
+        return any(robot.report for robot in self.robots)
+
+    def calibration_path(self, config: Path) -> Path:
+        return self.calibration or config.resolve().with_name(f"{config.stem}.calibration.toml")
+
+
+#: Of ``[estimator]``: the numbers among FloorSettings.
+_Settings: type[Section] = create_model(  # type: ignore[call-overload]
+    "_Settings",
+    __base__=Section,
+    **{
+        one.name: (Annotated[float, Field(gt=0)], getattr(FloorSettings(), one.name))
+        for one in fields(FloorSettings)
+        if one.name != "feet"
+    },
+)
+
+
+def _area(polygon: list[Xy]) -> float:
+    corners = zip(polygon, [*polygon[1:], polygon[0]], strict=True)
+    return abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in corners)) / 2

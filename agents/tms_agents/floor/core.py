@@ -1,0 +1,183 @@
+"""A floor without I/O: scans and states of its lasers go in, observations, states and what is seen come out."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from tms_agents.clocks import Clocks
+from tms_agents.devices.scans import Scan, Sweep
+from tms_agents.devices.transport import DeviceState
+from tms_agents.floor import FloorEstimator, FloorEvent, FloorLabel, Sensor
+from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.labels import Labels
+from tms_agents.floor.lasers import Laser, same_sweep
+from tms_agents.floor.settings import Pose
+from tms_agents.floor.story import told
+from tms_schemas.observation import Inventory, Observation
+
+log = logging.getLogger(__name__)
+_STORY = 100
+#: At the start, lasers that were never seen before may take so long to tell how they sweep.
+_GATHER_S = 5.0
+_REST_S = 0.25
+
+
+class Floor:
+    """``new_label`` gives ids that were never used; ``saved`` is what ``to_dict`` of a former run gave, or nothing.
+
+    Not for several threads at once, except for ``line`` and ``states``.
+    """
+
+    def __init__(
+        self,
+        config: FloorConfig,
+        poses: Mapping[str, Pose],
+        clocks: Clocks,
+        new_label: Callable[[], str],
+        saved: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.config, self._clocks = config, clocks
+        self.lasers = {one.name: Laser(one, poses.get(one.name), after=clocks.now()) for one in config.lasers}
+        self.labels = Labels(
+            new_label,
+            lambda: clocks.shift_s,
+            report_m=config.report_m,
+            report_s=config.report_s,
+            tells_robots=config.tells_robots,
+        )
+        self.estimator: FloorEstimator | None = None
+        self._sensors: dict[str, Sensor] = {}
+        self._first_at: float | None = None
+        self._rest_at = -np.inf
+        self._anew = False
+        #: What happened of late, for people: time of day and one line.
+        self.story: deque[tuple[datetime, str]] = deque(maxlen=_STORY)
+        #: Called with every scan that came (laser, time, scan), for recordings.
+        self.hear: Callable[[str, Pose, float, Scan], None] = lambda *_: None
+        if saved:
+            self._restore(saved)
+
+    def scans(self, laser: str, arrival: float, scans: Sequence[Scan]) -> list[Observation]:
+        """Scans that arrived together at ``arrival`` (sensor time), the oldest first; what is to be posted."""
+        one = self.lasers[laser]
+        mounted = [one.mounted(scan) for scan in scans]
+        found: list[Observation] = []
+        for t, scan in zip(one.times.of(arrival, mounted), mounted, strict=True):
+            self.hear(laser, one.pose, t, scan)
+            usable = one.usable(t, scan)
+            if usable and self._knows(laser, t, scan.sweep) and self.estimator is not None:
+                found += self._restart()
+                found += self._observations(self.estimator.scan(laser, t, scan.ranges, scan.intensities))
+                if t - self._rest_at >= _REST_S:
+                    self._rest_at = t
+                    found += self.labels.rest(t)
+        return found
+
+    def line(self, laser: str, state: DeviceState) -> None:
+        self.lasers[laser].line(state)
+
+    def states(self) -> dict[str, DeviceState]:
+        """Of every laser by name, once something is known of it."""
+        found = {f"laser {name}": one.state for name, one in self.lasers.items()}
+        return {name: state for name, state in found.items() if state is not None}
+
+    def seen(self) -> list[FloorLabel]:
+        """Everything that has a label now."""
+        return [] if self.estimator is None else self.estimator.labels()
+
+    def inventory(self) -> Inventory:
+        now = self._clocks.now()
+        labels = self.labels.inventory(self.seen(), now)
+        return Inventory(seq=0, observed_at=datetime.fromtimestamp(now + self._clocks.shift_s, UTC), labels=labels)
+
+    def to_dict(self) -> dict[str, Any]:
+        if self.estimator is None:
+            return {"t": self._clocks.now()}
+        return {
+            "t": self._clocks.now(),
+            "sweeps": {name: _sweep_to_dict(sensor.sweep) for name, sensor in self._sensors.items()},
+            "poses": {name: list(sensor.pose) for name, sensor in self._sensors.items()},
+            "labels": self.labels.to_dict(),
+            "estimator": self.estimator.to_dict(),
+        }
+
+    # below: inside
+
+    def _observations(self, events: Sequence[FloorEvent]) -> list[Observation]:
+        if not events:
+            return []
+        found = self.labels.observations(events)
+        shift = self._clocks.shift_s
+        for event in events:
+            if (text := told(event)) is not None:
+                self.story.append((datetime.fromtimestamp(event.t + shift, UTC), text))
+        return found
+
+    def _knows(self, laser: str, t: float, sweep: Sweep) -> bool:
+        """Whether the estimator knows this laser; it begins when all have told how they sweep, or the first waited."""
+        known = self._sensors.get(laser)
+        if self.estimator is not None and known is not None and same_sweep(known.sweep, sweep):
+            return True
+        self._first_at = t if self._first_at is None else self._first_at
+        sweeps = {name: one.sweep for name, one in self.lasers.items() if one.sweep is not None}
+        if self.estimator is None and len(sweeps) < len(self.lasers) and t - self._first_at < _GATHER_S:
+            return False
+        before = {name: sensor.sweep for name, sensor in self._sensors.items()}
+        self._begin(before | sweeps)
+        return True
+
+    def _restart(self) -> list[Observation]:
+        """An estimator that began anew knows nobody: say so."""
+        again, self._anew = self._anew, False
+        return [self.inventory()] if again else []
+
+    def _begin(self, sweeps: Mapping[str, Sweep]) -> None:
+        """A new estimator; what the one before knew is lost."""
+        if self.estimator is not None:
+            log.info("a laser is new or sweeps otherwise: the floor is learnt anew")
+            self.labels.begin_anew()
+            self._anew = True
+        self._sensors = {name: Sensor(sweep, self.lasers[name].pose) for name, sweep in sweeps.items()}
+        self.estimator = FloorEstimator(self._sensors, self.config.settings(), self.config.room_scene())
+
+    def _restore(self, saved: Mapping[str, Any]) -> None:
+        if "estimator" not in saved:
+            return
+        try:
+            sweeps = {name: _sweep_of(one) for name, one in saved["sweeps"].items()}
+            if set(sweeps) != set(self.lasers):
+                raise ValueError("it is of other lasers")
+            for name, pose in saved["poses"].items():
+                if not np.allclose(pose, self.lasers[name].pose, atol=1e-6):
+                    raise ValueError(f"laser {name} stands elsewhere now")
+            sensors = {name: Sensor(sweep, self.lasers[name].pose) for name, sweep in sweeps.items()}
+            estimator = FloorEstimator.from_dict(
+                saved["estimator"], sensors, self.config.settings(), self.config.room_scene()
+            )
+            self.labels.restore(saved["labels"])
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            log.warning("the saved state of the floor does not fit, starting anew: %s", error)
+            return
+        self._sensors, self.estimator = sensors, estimator
+
+
+def _sweep_to_dict(sweep: Sweep) -> dict[str, Any]:
+    return {
+        "angles": sweep.angles.tolist(),
+        "time_increment_s": sweep.time_increment_s,
+        "period_s": sweep.period_s,
+        "range_min_m": sweep.range_min_m,
+        "range_max_m": sweep.range_max_m if np.isfinite(sweep.range_max_m) else None,
+        "model": sweep.model,
+    }
+
+
+def _sweep_of(saved: Mapping[str, Any]) -> Sweep:
+    far = np.inf if saved["range_max_m"] is None else saved["range_max_m"]
+    return Sweep(**{**saved, "angles": np.array(saved["angles"], dtype=np.float64), "range_max_m": far})

@@ -1,0 +1,119 @@
+"""Sections that say which laser range finder looks over the floor, and how each is opened."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from tms_agents.config import Section
+from tms_agents.devices.cola import ColaSession
+from tms_agents.devices.lms200 import Lms200Session, serial_line
+from tms_agents.devices.scans import Scan
+from tms_agents.devices.scip import ScipLink, ScipSettings, scip_serial
+from tms_agents.devices.transport import Link, tcp
+from tms_agents.line_config import Line
+
+_Angle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+
+
+class ScipLaser(Line):
+    """A Hokuyo laser (URG, UTM, UST, UXM): serial or USB (``device``), or network (``host``, port 10940)."""
+
+    kind: Literal["scip"]
+    #: Radians in the sensor's frame, 0 is straight ahead, counter-clockwise; none: all that it measures.
+    angle_min: _Angle | None = None
+    angle_max: _Angle | None = None
+    #: Of so many neighbouring beams the nearest echo; so many scans left out between two.
+    cluster: Annotated[int, Field(ge=1, le=99)] = 1
+    skip: Annotated[int, Field(ge=0, le=9)] = 0
+    #: Ranges up to 4 m in fewer bytes, for slow serial lines.
+    short: bool = False
+    #: Have the strength of the echoes sent, too, by a model that tells it.
+    intensity: bool = False
+
+    default_port: ClassVar[int | None] = 10940
+
+    @model_validator(mode="after")
+    def _possible(self) -> ScipLaser:
+        self._settings()
+        return self
+
+    def _settings(self) -> ScipSettings:
+        intensity: Literal["auto", "off"] = "auto" if self.intensity else "off"
+        return ScipSettings(intensity, self.angle_min, self.angle_max, self.cluster, self.skip, self.short)
+
+    def link(self, silent_after_s: float) -> Link[Scan]:
+        opener = self.opener(115_200) if self.device is None else scip_serial(self.device, self.baud)
+        return ScipLink(opener, self._settings(), name=f"SCIP laser {self.place}", silent_after_s=silent_after_s)
+
+
+class LmsLaser(Section):
+    """A SICK LMS2xx on a serial line."""
+
+    kind: Literal["lms200"]
+    device: str
+    baud: Literal[9600, 19200, 38400, 500000] = 38400
+    #: Field of view and step in degrees; none: as the laser is set up.
+    angle_deg: Literal[100, 180] | None = 180
+    resolution_deg: Annotated[float, Field(ge=0.25, le=1)] | None = 0.5
+
+    @model_validator(mode="after")
+    def _possible(self) -> LmsLaser:
+        if self.resolution_deg not in (None, 0.25, 0.5, 1.0):
+            raise ValueError(f"resolution_deg is 0.25, 0.5 or 1, not {self.resolution_deg:g}")
+        self._session()
+        return self
+
+    def _session(self) -> Lms200Session:
+        return Lms200Session(angle_deg=self.angle_deg, resolution_deg=self.resolution_deg, baud=self.baud)
+
+    def link(self, silent_after_s: float) -> Link[Scan]:
+        return Link(
+            serial_line(self.device, self.baud),
+            self._session,
+            name=f"LMS2xx {self.device}",
+            silent_after_s=silent_after_s,
+        )
+
+
+class ColaLaser(Section):
+    """A SICK TiM, LMS1xx or LMS5xx on the network (ports 2111 and 2112)."""
+
+    kind: Literal["cola"]
+    host: str
+    port: Annotated[int, Field(ge=1, le=65535)] = 2112
+    dialect: Literal["auto", "A", "B"] = "auto"
+    #: The device's own angle of straight ahead, degrees.
+    forward_deg: Annotated[float, Field(ge=-360, le=360)] = 90.0
+    #: Set where given, models that can; a pace or a field goes with a resolution.
+    frequency_hz: Annotated[float, Field(gt=0, le=200)] | None = None
+    resolution_deg: Annotated[float, Field(gt=0, le=10)] | None = None
+    layer: Annotated[int, Field(ge=-100, le=100)] = 0
+
+    @model_validator(mode="after")
+    def _possible(self) -> ColaLaser:
+        self._session()
+        return self
+
+    def _session(self) -> ColaSession:
+        return ColaSession(
+            dialect=self.dialect,
+            intensities=None,
+            frequency_hz=self.frequency_hz,
+            resolution_deg=self.resolution_deg,
+            forward_deg=self.forward_deg,
+            layer=self.layer,
+        )
+
+    def link(self, silent_after_s: float) -> Link[Scan]:
+        return Link(
+            tcp(self.host, self.port),
+            self._session,
+            name=f"CoLa laser {self.host}:{self.port}",
+            silent_after_s=silent_after_s,
+        )
+
+
+LaserSource = Annotated[ScipLaser | LmsLaser | ColaLaser, Field(discriminator="kind")]

@@ -1,0 +1,30 @@
+"""Has the estimator compiled before the first scan needs it: a few made-up scans with somebody who drops something."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tms_agents.devices.scans import Sweep
+from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
+
+_BEAMS, _HZ = 128, 20
+
+
+def warm_up() -> None:
+    """Takes a quarter of a second, or, the first time on a computer, up to a minute."""
+    angles = np.linspace(-1.2, 1.2, _BEAMS)
+    sweep = Sweep(angles, 0.0, 1 / _HZ, 0.02, 5.0)
+    settings = FloorSettings(learn_s=0.5, start_s=0.2, rest_s=0.4, alone_s=0.2)
+    estimator = FloorEstimator({"warm": Sensor(sweep, (0.0, 0.0, 0.0))}, settings)
+    random = np.random.default_rng(0)
+    for n in range(8 * _HZ):
+        t = n / _HZ
+        ranges = 3.0 + random.normal(0, 0.003, _BEAMS)
+        if t > 2.0:
+            walker = -1.0 + 0.35 * (t - 2.0)
+            ranges[np.abs(angles - walker) < 0.05] = 1.5
+            ranges[np.abs(angles - walker - 0.16) < 0.05] = 1.4
+        if 3.5 < t < 6.5:
+            ranges[np.abs(angles + 0.6) < 0.04] = 1.6
+        estimator.scan("warm", t, ranges)
+    estimator.labels()
