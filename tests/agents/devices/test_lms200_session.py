@@ -225,7 +225,7 @@ def test_the_device_says_when_it_was_not_heard():
 
 
 KINDS = st.sampled_from(["flip", "drop", "insert"])
-damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 800), KINDS, st.integers(1, 255)), max_size=8)
+damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 800), KINDS, st.integers(1, 255)), max_size=4)
 
 
 @settings(deadline=None, max_examples=25)

@@ -86,7 +86,8 @@ def content(intensities: bool, *, bits: int = 16) -> Command:
     """Send the first echo, with intensities of 8 or 16 bits, of every scan."""
 
     def values(writer: Writer) -> Writer:
-        writer.put("B", 1, 0, intensities, bits == 16, 0, 0, 0, 0, 0, 0, 0)
+        # first echo; unit of the intensities, encoders, position, name and comment: none; the time: yes
+        writer.put("B", 1, 0, intensities, bits == 16, 0, 0, 0, 0, 0, 0, 1)
         return writer.put("H", 1)
 
     return _command("sWN", "LMDscandatacfg", values, optional=False)

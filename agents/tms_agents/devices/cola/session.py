@@ -16,7 +16,7 @@ from tms_agents.devices.outgoing import Outgoing
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.sessions import DeviceFault
 
-_REPLY_S, _METHOD_S, _REPEATS = 1.0, 5.0, 1
+_REPLY_S, _METHOD_S, _REPEATS = 1.0, 3.0, 1
 #: So many starts, or damaged scans, in a row without a good scan between them are a fault.
 _MAX_STARTS, _MAX_DAMAGED = 3, 5
 _CLOCK_BITS = 32
