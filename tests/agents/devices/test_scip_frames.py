@@ -216,10 +216,11 @@ def test_the_speed_of_the_motor(text, speed):
         ("URG-04LX", [0, 1, 6, 19, 20, 5600, 5601], [math.inf, math.nan, math.nan, math.nan, 0.02, 5.6, math.inf]),
         ("UTM-30LX", [0, 1, 2, 3, 4, 5, 22, 23], [math.nan, math.inf, *[math.nan] * 5, 0.023]),
         ("UST-20LX", [0, 1, 19, 20, 60000, 65533], [math.nan] * 3 + [0.02, 60.0, math.inf]),
+        ("of next year", [0, 1, 20, 30000, 30001], [math.nan] * 2 + [0.02, 30.0, math.inf]),
     ],
 )
 def test_codes_are_no_distances(model, raw, metres):
-    p = MODELS[model].parameters
+    p = MODELS[model].parameters if model in MODELS else Parameters(model, 20, 30000, 1440, 0, 1080, 540, 2400)
     body = stamp(0) + data(np.array(raw), None, 3)
     (found,) = read_capture(reply(Measure("GD", 0, len(raw) - 1).encode(), "00", body))
     np.testing.assert_allclose(ranges(found, p), metres)

@@ -110,7 +110,8 @@ async def test_the_makers_own_programs_on_a_serial_line(model):
         told = await run("sensor_parameter", "-s", line.path)
         measured = await run("get_distance", "-s", line.path)
     assert f"product type: {device.model.product}" in told and f"serial ID: {device.model.serial}" in told
-    assert f"distance: [{p.dmin}, {p.dmax})" in told and "step: [-" in told
+    assert f"distance: [{p.dmin}, {p.dmax}" in told and "step: [-" in told
+    assert "status: Sensor works well." in told or "status: sensor is working normally" in told
     assert measured.count(f"{front * 1000:.0f} [mm]") == 10
 
 

@@ -55,8 +55,9 @@ class ScipDevice:
         self.refuse: dict[str, str] = {}
         self.garble_next = self.cut_next = self.lose_next = 0
         self.line_baud: Callable[[], int] | None = None
-        #: VV as some URG-04LX send it: a line too many and a wrong sum.
-        self.stray_line = False
+        #: Odd firmware: VV of some URG-04LX has a line too many and a wrong sum, II of the first UTM-30LX sums without
+        #: the remarks behind <-.
+        self.stray_line = self.remarks_unsummed = False
         #: Of the motor, 1/min.
         self.motor_speed = p.scan
         #: Added to the sensor's own clock, to see it begin again.
@@ -263,7 +264,7 @@ class ScipDevice:
             stamp_ms=self._stamp_ms(),
             broken=bool(self.broken),
         )
-        return wording.fields(texts, remarks_unsummed=model.remarks_unsummed)
+        return wording.fields(texts, remarks_unsummed=self.remarks_unsummed)
 
     def _measure(self, command: str, name: str) -> bytes:
         if name[1] == "E" and self.model.dies_of_intensity:

@@ -23,6 +23,7 @@ _BEGINS = re.compile(rb"(?=" + _COMMAND.pattern + rb"\n(?:..)?.\n)", re.S)
 #: Not a text of the host's: the reply that has it lost its end there, and another began.
 _BROKEN_OFF = re.compile(rb";.*[MG][DSE][0-9]{10}")
 _MEASURE = re.compile(rb"[MG][DSE][0-9]{10}")
+_TEXT = re.compile(rb"[ -~]*")
 _MOST_TRIES = 4
 _STAMP = 4
 
@@ -91,6 +92,8 @@ def text_line(line: bytes) -> bytes | None:
     The sum may count the ``;`` before it or not, and a remark behind ``<-`` or not: all of these are in use.
     """
     text, total = line[:-1], line[-1]
+    if not _TEXT.fullmatch(text):
+        return None
     plain = text.removesuffix(b";")
     for counted in (plain, text, plain.partition(b"<-")[0]):
         if checksum(counted) == total:

@@ -27,12 +27,18 @@ class Coding:
 _URG = Coding(far=0, near=6, error=6, intensity=False)
 _UTM = Coding(far=1, near=4, error=5, intensity=True)
 _UST = Coding(far=65533, near=0, error=0, intensity=True)
-_CODINGS = {"UTM-30LX": _UTM, "UXM-30LX": _UTM, "UST-": _UST}
+_CODINGS = {
+    **dict.fromkeys(("URG-04LX", "UBG-04LX", "UBG-05LX", "UHG-08LX"), _URG),
+    **dict.fromkeys(("UTM-30LX", "UXM-30LX"), _UTM),
+    "UST-": _UST,
+}
+#: Nobody knows its codes: far is only what is beyond its reach.
+_UNKNOWN = Coding(far=(1 << 18) - 1, near=0, error=0, intensity=False)
 
 
 def coding(modl: str) -> Coding:
-    """By the MODL of PP; a model that nobody knows is treated like the oldest."""
-    return next((found for start, found in _CODINGS.items() if modl.startswith(start)), _URG)
+    """By the MODL of PP."""
+    return next((found for start, found in _CODINGS.items() if modl.startswith(start)), _UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +56,6 @@ class Model:
     serial_line: bool = False
     #: Knows %ST and %SL and answers in the words of SCIP 2.2.
     states: bool = False
-    #: A remark behind <- in II is not part of the sum.
-    remarks_unsummed: bool = False
     #: Scans with intensity kill it.
     dies_of_intensity: bool = False
     coding: Coding = field(init=False)
@@ -88,7 +92,6 @@ MODELS = {
         "SOKUIKI Sensor TOP-URG UTM-30LX",
         "1.20.02(27/Dec./2011)",
         "H0803606",
-        remarks_unsummed=True,
     ),
     "UTM-30LX-EW": Model(
         Parameters("UTM-30LX-EW", 23, 60000, 1440, 0, 1080, 540, 2400),

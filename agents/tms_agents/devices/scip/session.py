@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from tms_agents.devices.outgoing import Outgoing
@@ -170,20 +170,25 @@ class ScipSession(Outgoing):
         self._old, self.about = True, fields(reply.lines)
 
     def _learn(self) -> _Course:
-        why = "no answer"
+        why, self._parameters = "no answer", None
         for _ in range(_MOST_TRIES):
             reply = yield _Ask("PP", self._reply_s)
+            if reply is None:
+                continue
             try:
-                self._parameters = Parameters.parse(reply.lines if reply is not None else ())
-                break
+                self._parameters = Parameters.parse(reply.lines)
             except ValueError as error:
-                why = str(error) if reply is not None else why
-        else:
+                why = str(error)
+            if self._parameters is not None and self._parameters.modl:  # a damaged line is left out
+                break
+        if self._parameters is None:
             raise DeviceFault(f"the sensor does not tell its parameters (PP): {why}")
         if "PROD" not in self.about:  # only once: a URG-04LX that is asked often falls silent
             reply = yield _Ask("VV", self._reply_s)
             self.about |= fields(reply.lines if reply is not None else ())
         yield from self._ask_state()
+        if not self._parameters.modl:
+            self._parameters = replace(self._parameters, modl=self.about.get("MODL", ""))
         self._speed = motor_speed(self.about, self._parameters.scan)
 
     def _measure(self) -> _Course:
