@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from tms_agents.cabinet.densities import PutDensity, normal
+from tms_agents.cabinet.densities import PutDensity, balanced, normal
 from tms_agents.cabinet.fusion import Evidence, Explanation, Kind
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.settings import EstimatorSettings
-from tms_agents.cabinet.stays import Shelf, Thing
+from tms_agents.cabinet.stays import Shelf, Thing, errors_of
 from tms_agents.cabinet.steady import chi_square_limit
 from tms_agents.cabinet.steps import Step
 
@@ -136,20 +136,21 @@ def search(
         sets.append(tuple(things))
     for those in sets:
         left = step.change + sum((thing.load for thing in those), np.zeros_like(step.change))
-        variance = step.variance + sum((spreads[thing.id] for thing in those), np.zeros_like(step.change))
+        errors, sure = errors_of(those, step.now, settings.creep_per_hour, shelf.geometry.count)
+        variance, total = step.variance + errors, float(step.variance.sum()) + sure
         prior = sum(math.log(_OVER) + taken[thing.id] for thing in those)
         if those:
-            found.append(Explanation("take", prior + normal(left, variance), removed=those))
-        score = put(left, variance)
+            found.append(Explanation("take", prior + balanced(left, variance, total), removed=those))
+        score = put(left, variance, total)
         if score > -math.inf:
             kind: Kind = "swap" if those else "put"
             found.append(Explanation(kind, prior + math.log(_NEW) + score, removed=those, load=left))
     if settings.knows_places:
         found += _measured_badly(step, things, spreads, taken, put, right_at)
     top = max(item.score for item in found)
-    total = sum(math.exp(item.score - top) for item in found)
+    all_of_them = sum(math.exp(item.score - top) for item in found)
     ranked = sorted(found, key=lambda item: -item.score)
-    return [replace(item, score=math.exp(item.score - top) / total) for item in ranked]
+    return [replace(item, score=math.exp(item.score - top) / all_of_them) for item in ranked]
 
 
 def _measured_badly(

@@ -95,7 +95,19 @@ class Bookkeeper:
             thing.variance = step.variance - step.before_variance + settling.variance
             self.settling = Settling(thing, settling.before, settling.variance, step.now, new=settling.new)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
-        return events
+        return events + self._regroup(step, explanation, gone)
+
+    def _regroup(self, step: Step, explanation: Explanation, load: Array) -> list[CabinetEvent]:
+        """Some of a group have gone, which were held to weigh ``load``: that tells of the others, unless more came."""
+        gone = {thing.id for thing in explanation.removed}
+        partners = self._shelf.partners(gone)
+        if not partners:
+            return []
+        if explanation.kind != "take":
+            self._shelf.join([*partners, *self.newest], gone)
+            return []
+        self._shelf.tell_apart(partners, gone, step.change + load, step.variance)
+        return self._tell(partners[0], step.now, always=True) if len(partners) == 1 else []
 
     def _place(self, settling: Settling, step: Step) -> None:
         """Nothing else came with this step: all of it tells where the thing stands."""
@@ -126,24 +138,13 @@ class Bookkeeper:
             events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
             self.newest.append(thing)
         ids = tuple(thing.id for thing in self.newest)
-        for thing in self.newest:
-            thing.joint = frozenset(ids) - {thing.id}
+        self._shelf.join(self.newest)
         if explanation.kind == "joint":
             events.append(LoadChanged(step.now, ids, step.weight_g, float(np.sqrt(step.variance.sum()))))
         return events
 
     def _remove(self, thing: Thing, step: Step, *, alone: bool) -> Vanished:
         del self._shelf.things[thing.id]
-        partners = [self._shelf.things[i] for i in thing.joint if i in self._shelf.things]
-        if alone and partners:
-            # The sum of things that came together is known: what this one weighed less, the others weigh more.
-            rest = (step.change + thing.load) / len(partners)
-            for partner in partners:
-                partner.load = partner.load + rest
-                partner.forget_place()
-                partner.joint = partner.joint - {thing.id}
-                if len(partners) == 1:
-                    partner.variance, partner.joint = step.variance * 2, frozenset()
         at = thing.centre(self._shelf.geometry)
         if not alone:
             return Vanished(step.now, thing.id, at.weight_g, at.weight_sd_g)

@@ -22,6 +22,13 @@ def normal(value: Array, variance: Array) -> float:
     return float(-0.5 * (value**2 / variance + np.log(2 * math.pi * variance)).sum())
 
 
+def balanced(value: Array, variance: Array, total: float) -> float:
+    """The same, but the sum of the errors is known to have the variance ``total``."""
+    weight, sd2 = float(value.sum()), float(variance.sum())
+    sharper = -0.5 * (weight**2 / total + math.log(total)) + 0.5 * (weight**2 / sd2 + math.log(sd2))
+    return normal(value, variance) + sharper
+
+
 class PutDensity:
     """Log density of a load vector (k,), per g^k, if it is that of one thing somewhere on the board."""
 
@@ -43,8 +50,9 @@ class PutDensity:
         self._area = geometry.width * geometry.depth
         self._jacobian = float(np.linalg.slogdet(np.vstack([geometry.moments, geometry.twist]))[1])
 
-    def __call__(self, load: Array, variance: Array) -> float:
-        weight, sd2 = float(load.sum()), float(variance.sum())
+    def __call__(self, load: Array, variance: Array, total: float | None = None) -> float:
+        """``total``: variance of the sum of the load, where that is not what the cells have together."""
+        weight, sd2 = float(load.sum()), float(variance.sum()) if total is None else total
         if weight < max(self._clear * math.sqrt(sd2), self._least_g):
             return -math.inf
         place = off_board(load, variance, self.geometry) - math.log(self._area) - 2 * math.log(weight)

@@ -16,10 +16,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tms_agents.cabinet.blocks import Block
-from tms_agents.cabinet.densities import PutDensity, normal
+from tms_agents.cabinet.densities import PutDensity, balanced
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.plans import Known, plans_of
-from tms_agents.cabinet.stays import Thing
+from tms_agents.cabinet.stays import Thing, errors_of
 from tms_agents.cabinet.ways import WAY, way_odds
 
 #: A level at rest is never known better than this.
@@ -90,16 +90,17 @@ def outcomes(
         if prior < plans[0].prior - _HOPELESS:
             break
         left = change + sum((things[i].load for i in sorted(gone)), np.zeros_like(change))
-        both = spread + sum((noises[i] for i in sorted(gone)), np.zeros_like(change))
+        errors, sure = errors_of([things[i] for i in sorted(gone)], now, creep_per_hour, geometry.count)
+        both, total = spread + errors, float(spread.sum()) + sure
         one = _not_told_apart(gone, things)
         if new:
-            density = _of_new(left, both, new, [things[i] for i in sorted(gone)], known, geometry)
+            density = _of_new(left, both, total, new, [things[i] for i in sorted(gone)], known, geometry)
         elif one is not None:
             # Only the sum of it and of others was known: it stood anywhere.
             alone = PutDensity(geometry, _LEAST_G, [_weight(one)], trust=_TRUST, clear=_CLEAR)
             density = alone(one.load - left, both - noises[one.id])
         else:
-            density = _of_nothing(left, both, [things[i] for i in sorted(gone)], known.shaking)
+            density = _of_nothing(left, both, total, [things[i] for i in sorted(gone)], known.shaking)
         if density > -math.inf:
             found.append(Outcome(gone, new, prior + density, left, both))
     found = sorted(found, key=lambda outcome: -outcome.score)[:_MOST_PATHS]
@@ -115,6 +116,7 @@ def outcomes(
 def _of_new(
     load: Array,
     variance: Array,
+    total: float,
     new: Sequence[str | None],
     gone: Sequence[Thing],
     known: Known,
@@ -123,14 +125,15 @@ def _of_new(
     """Log density of a load that is that of the ``new`` things."""
     of = _expected(gone, new, known.weight)
     put = PutDensity(geometry, _LEAST_G * len(new), of, trust=_TRUST if of else 0.5, clear=_CLEAR)
-    return put(load, variance) + (_IN_THE_MIDDLE if len(new) == 2 else 0.0)
+    return put(load, variance, total) + (_IN_THE_MIDDLE if len(new) == 2 else 0.0)
 
 
-def _of_nothing(left: Array, variance: Array, gone: Sequence[Thing], shaking: bool) -> float:
+def _of_nothing(left: Array, variance: Array, total: float, gone: Sequence[Thing], shaking: bool) -> float:
     """Log density of what is left and should be nothing: but for noise, or for what was measured badly."""
     share, far = (_SHAKEN, _SHAKEN_G) if shaking else (_LOOSE, _BADLY_G)
-    badly = variance + far**2 + sum(((0.1 * np.abs(thing.load)) ** 2 for thing in gone), np.zeros_like(left))
-    return float(np.logaddexp(math.log(1 - share) + normal(left, variance), math.log(share) + normal(left, badly)))
+    more = far**2 + sum(((0.1 * np.abs(thing.load)) ** 2 for thing in gone), np.zeros_like(left))
+    well, badly = balanced(left, variance, total), balanced(left, variance + more, total + float(more.sum()))
+    return float(np.logaddexp(math.log(1 - share) + well, math.log(share) + badly))
 
 
 def _unexplained(

@@ -20,12 +20,12 @@ from typing import Literal
 
 import numpy as np
 
-from tms_agents.cabinet.densities import PutDensity, normal
+from tms_agents.cabinet.densities import PutDensity, balanced, normal
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.position import centre, centre_free
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.splitting import Split, path_odds, split
-from tms_agents.cabinet.stays import Shelf, Thing
+from tms_agents.cabinet.stays import Shelf, Thing, errors_of
 from tms_agents.cabinet.steps import Step
 
 Kind = Literal["unknown", "settled", "put", "take", "slide", "swap", "adjust", "press", "two", "joint"]
@@ -133,11 +133,12 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         swing = math.log(_PRIOR["settled"] * _SWINGS) + normal(change, variance + _SWING_G**2)
         found.append(Explanation("settled", swing))
     each = math.log(1.0 / max(len(things), 1))
-    noises = [thing.at(step.now, settings.creep_per_hour) for thing in things]
+    errors = [errors_of([thing], step.now, settings.creep_per_hour, geometry.count) for thing in things]
+    noises, whole_variance = [noise for noise, _ in errors], float(variance.sum())
     taken = [evidence.taken(thing) for thing in things]
-    for thing, noise, tag in zip(things, noises, taken, strict=True):
-        left, both = change + thing.load, variance + noise
-        tight, loose = _remaining(left, both, thing)
+    for thing, (noise, total), tag in zip(things, errors, taken, strict=True):
+        left, both, total = change + thing.load, variance + noise, whole_variance + total
+        tight, loose = _remaining(left, both, total, thing)
         prior = math.log(_PRIOR["take"]) + each + tag
         both_ways = float(np.logaddexp(tight, loose))
         found.append(Explanation("take", prior + both_ways, removed=(thing,), tight=tight > loose))
@@ -148,7 +149,7 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             whole = left + newest.load
             score = prior + put(whole, both + newest.variance)
             found.append(Explanation("adjust", score, removed=(thing,), thing=newest, load=whole))
-        after = put(left, both)
+        after = put(left, both, total)
         if after > -math.inf:
             prior = math.log(_PRIOR["swap"]) + each + tag + path_odds(step, -thing.load, geometry)
             # A thing half lifted or tilted looks like a lighter one in its place.
@@ -179,16 +180,17 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             score = math.log(_PRIOR["take"]) + each + evidence.taken(which) + doubt.odds
             score += normal(change + which.load + sign * doubt.change, noise)
             found.append(Explanation("take", score, removed=(which,), undo=doubt))
-    found += _two_taken(step, things, noises, taken, geometry)
+    found += _two_taken(step, things, noises, taken, geometry, settings)
     if step.weight_g > 2 * settings.min_weight_g:
         found += _two_put(step, put, evidence.loose)
     return _normalised(found)
 
 
-def _remaining(left: Array, variance: Array, thing: Thing) -> tuple[float, float]:
+def _remaining(left: Array, variance: Array, total: float, thing: Thing) -> tuple[float, float]:
     """Log densities of what is left when ``thing`` is taken: measured well, and badly."""
-    loose = normal(left, variance + (0.15 * np.abs(thing.load) + 12.0) ** 2)
-    return math.log(1 - _LOOSE) + normal(left, variance), math.log(_LOOSE) + loose
+    badly = (0.15 * np.abs(thing.load) + 12.0) ** 2
+    loose = balanced(left, variance + badly, total + float(badly.sum()))
+    return math.log(1 - _LOOSE) + balanced(left, variance, total), math.log(_LOOSE) + loose
 
 
 def _crowded(load: Array, shelf: Shelf, gone: Thing | None = None) -> float:
@@ -226,7 +228,12 @@ def _taken_and_pressed(
 
 
 def _two_taken(
-    step: Step, things: list[Thing], noises: list[Array], taken: list[float], geometry: Geometry
+    step: Step,
+    things: list[Thing],
+    noises: list[Array],
+    taken: list[float],
+    geometry: Geometry,
+    settings: EstimatorSettings,
 ) -> list[Explanation]:
     if len(things) < 2 or step.weight_g > 0:
         return []
@@ -235,6 +242,12 @@ def _two_taken(
     left = step.change + loads[first] + loads[second]
     both = step.variance + spreads[first] + spreads[second]
     scores = -0.5 * (left**2 / both + np.log(2 * math.pi * both)).sum(axis=1) + tags[first] + tags[second]
+    for i, pair in enumerate(zip(first, second, strict=True)):
+        two = [things[n] for n in pair]
+        if any(thing.joint for thing in two):
+            noise, total = errors_of(two, step.now, settings.creep_per_hour, geometry.count)
+            scores[i] = balanced(left[i], step.variance + noise, float(step.variance.sum()) + total)
+            scores[i] += tags[pair[0]] + tags[pair[1]]
     scores += math.log(_TWO_TAKEN / len(first))
     best = np.argsort(scores)[::-1][:8]
     for i in best:

@@ -24,9 +24,6 @@ from tms_agents.cabinet.stays import Shelf, Thing
 _LOOK_S, _RESTED_S, _CLOSED_S = 1.5, 2.5, 4.0
 #: Another outcome must be so sure, and what was told so improbable.
 _SURE, _DOUBT = 0.9, 0.05
-#: What was told and is less probable leaves an episode open for so long: what comes next may tell. It is looked at now
-#: and then.
-_OPEN, _OPEN_S, _AGAIN_S = 0.5, 60.0, 2.0
 #: More often than that an episode is not put right: something else speaks against it.
 _MOST_REVISIONS = 2
 #: How long a lifted thing's tag may stay in view in the hand.
@@ -43,15 +40,13 @@ class Hindsight:
         self._before: list[Thing] | None = None
         self._episode: Episode | None = None
         self._uncertain = False
-        self._open = False
-        self._looked = -math.inf
         self._revisions = 0
 
     def changing(self, block: Block, level: Level) -> None:
         """The load is not at rest; ``level`` is where it last rested."""
         if self._before is not None:
             self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start)
-            self._before, self._uncertain, self._open, self._revisions = None, False, False, 0
+            self._before, self._uncertain, self._revisions = None, False, 0
         if self._episode is not None:
             self._episode.add(block)
 
@@ -64,18 +59,14 @@ class Hindsight:
     ) -> list[CabinetEvent]:
         """The load rests at ``level``, (k,) g, for some ``seconds``; the last change ended at ``rested``."""
         events: list[CabinetEvent] = []
-        due = seconds < _CLOSED_S or t - self._looked >= _AGAIN_S
-        if self._episode is not None and seconds >= _LOOK_S and due:
-            self._looked, self._open = t, False
-            if self._revisions < _MOST_REVISIONS:
-                events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
-            self._open = self._open and t - self._episode.onset < _OPEN_S
-        if seconds >= _RESTED_S and not self._open:
+        if self._episode is not None and seconds >= _LOOK_S and self._revisions < _MOST_REVISIONS:
+            events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
+        if seconds >= _RESTED_S:
             self._before = [
                 replace(thing, load=thing.load.copy(), variance=thing.variance.copy())
                 for thing in self._shelf.things.values()
             ]
-        if seconds >= _CLOSED_S and not self._open:
+        if seconds >= _CLOSED_S:
             self._episode = None
         return events
 
@@ -101,11 +92,10 @@ class Hindsight:
             self._settings.creep_per_hour,
         )
         told, best = current(episode, self._shelf), found[0]
-        likely = sum(one.score for one in found if one.known and _same(one, told))
-        self._open = best.known and likely < _OPEN
-        if not best.known or best.score < _SURE or _same(best, told) or likely > _DOUBT:
+        if not best.known or best.score < _SURE or _same(best, told):
             return []
-        self._open = False
+        if sum(one.score for one in found if one.known and _same(one, told)) > _DOUBT:
+            return []
         self._revisions += 1
         return Revision(
             self._shelf,

@@ -100,21 +100,24 @@ class Revision:
             events += self._put(old.load, old.variance, old.tag, old.since)
             # A stay is never used again: from now on this is the one that stood there before.
             old.id = self._shelf.next_id - 1
-        return events + self._share(stays, wanted) + later
+        known = set(self._shelf.things)
+        events += self._share(stays, wanted)
+        new = [*stays, *(thing for i, thing in self._shelf.things.items() if i not in known)]
+        if new and (partners := self._shelf.partners(self._outcome.gone)):
+            self._shelf.join([*partners, *new], self._outcome.gone)
+        return events + later
 
     def _told_apart(self) -> None:
-        """One of several that came together has gone: what it weighed less than was thought, the others weigh more."""
-        gone, load = self._outcome.gone, self._outcome.load
-        others = [old for old in self._episode.things if old.joint & gone and old.id not in gone]
-        if self._outcome.new or not others:
+        """Some of a group have gone and nothing came: that tells where the others stand, now and before."""
+        gone = self._outcome.gone
+        old = [thing for thing in self._episode.things if thing.id not in gone and thing.joint & gone]
+        if not old or self._outcome.new:
             return
-        for old in others:
-            old.load, old.joint = old.load + load / len(others), old.joint - gone
-            if len(others) == 1:
-                old.variance = 2 * self._outcome.variance
-            now = self._shelf.things.get(old.id)
+        self._shelf.tell_apart(old, gone, self._outcome.load, self._outcome.variance)
+        for thing in old:
+            now = self._shelf.things.get(thing.id)
             if now is not None:
-                now.load, now.variance, now.joint = old.load.copy(), old.variance.copy(), old.joint
+                now.load, now.variance, now.joint = thing.load.copy(), thing.variance.copy(), thing.joint
 
     def _remove(self, thing: Thing) -> Vanished:
         self._left(thing)
@@ -157,8 +160,7 @@ class Revision:
         for tag, (share, guess) in zip(wanted, guesses[len(stays) :], strict=True):
             events += self._put(share, guess, tag, self._episode.onset)
             together.append(self._shelf.things[self._shelf.next_id - 1])
-        for thing in together:
-            thing.joint = frozenset(other.id for other in together if other is not thing)
+        self._shelf.join(together)
         ids, sd = tuple(thing.id for thing in together), float(np.sqrt(self._outcome.variance.sum()))
         return [*events, LoadChanged(self._now, ids, float(load.sum()), sd)]
 

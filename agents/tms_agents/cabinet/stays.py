@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,9 @@ import numpy as np
 from tms_agents.cabinet.events import Stay
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.position import Centre, centre
+
+#: The share of each of several things that came together in the error of their sum, per cell.
+_TOGETHER_G = 2.0
 
 
 @dataclass(slots=True, eq=False)
@@ -61,6 +64,25 @@ class Thing:
         return self.variance + (share * np.abs(self.load)) ** 2
 
 
+def errors_of(things: Sequence[Thing], now: float, creep_per_hour: float, cells: int) -> tuple[Array, float]:
+    """Errors of the sum of the loads of ``things``: variance (k,) g^2, and variance of its total, g^2.
+
+    Of things that came together the sum is known well. One of them alone may have stood anywhere, but weighs what its
+    tag tells.
+    """
+    variance, total, ids = np.zeros(cells), 0.0, {thing.id for thing in things}
+    for thing in things:
+        own = thing.at(now, creep_per_hour)
+        if thing.joint and thing.joint <= ids:
+            own = own - thing.variance + _TOGETHER_G**2
+        variance += own
+        if thing.joint and not thing.joint <= ids and thing.known is not None:
+            total += thing.known.sd_g**2 + (0.005 * thing.known.mean_g) ** 2
+        else:
+            total += float(own.sum())
+    return variance, total
+
+
 @dataclass(slots=True)
 class Shelf:
     """All things on the board, by id; ids are never used again."""
@@ -74,6 +96,24 @@ class Shelf:
         self.next_id += 1
         self.things[thing.id] = thing
         return thing
+
+    def partners(self, gone: Collection[int]) -> list[Thing]:
+        """Things that came together with some of those ``gone`` (ids) and are still there."""
+        return [thing for thing in self.things.values() if thing.id not in gone and thing.joint & set(gone)]
+
+    def tell_apart(self, partners: Sequence[Thing], gone: Collection[int], left: Array, variance: Array) -> None:
+        """Others of their group have gone: what those weighed less than thought, ``left`` (k,), these weigh more."""
+        for thing in partners:
+            thing.load, thing.joint = thing.load + left / len(partners), thing.joint - set(gone)
+            if len(partners) == 1:
+                thing.variance, thing.joint = 2 * variance, frozenset()
+            thing.forget_place()
+
+    def join(self, things: Sequence[Thing], gone: Collection[int] = ()) -> None:
+        """Of these only the sum is known from now on; those ``gone`` belonged to some of them."""
+        for thing in things:
+            others = {other.id for other in things if other is not thing}
+            thing.joint = (thing.joint | others) - set(gone)
 
     def tagged(self, tag: str) -> Thing | None:
         return next((thing for thing in self.things.values() if thing.tag == tag), None)
