@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,6 +43,23 @@ class Motion:
     end: float
     before: Pose
     after: Pose
+    way: tuple[Xy, ...] = ()
+
+    def pose(self, t: float) -> Pose:
+        """On the way at ``t``: slow at both ends."""
+        u = min(1.0, max(0.0, (t - self.start) / (self.end - self.start)))
+        u = u * u * (3 - 2 * u)
+        a, b = self.before, self.after
+        points = [a[:2], *self.way[:-1], b[:2]]
+        legs = [math.dist(p, q) for p, q in pairwise(points)]
+        left, i = u * sum(legs), 0
+        while i < len(legs) - 1 and left > legs[i]:
+            left -= legs[i]
+            i += 1
+        v = left / legs[i] if legs[i] > 0 else 0.0
+        (x0, y0), (x1, y1) = points[i], points[i + 1]
+        turn = math.remainder(b[2] - a[2], 2 * math.pi)
+        return (x0 + v * (x1 - x0), y0 + v * (y1 - y0), a[2] + u * turn)
 
 
 class Life:
@@ -98,12 +116,12 @@ class Life:
     def drag(self, task: Drag, t: float) -> None:
         """Begin to move a piece of furniture; it goes on by itself."""
         before = self.room.furniture[task.furniture].pose
-        self.motions.append(Motion(task.furniture, t, t + task.seconds, before, task.to))
+        self.motions.append(Motion(task.furniture, t, t + task.seconds, before, task.to, task.way))
 
     def dragged(self, task: Drag, t: float, dt: float) -> Xy:
         """How far it went in the last ``dt`` seconds."""
         motion = next(m for m in reversed(self.motions) if m.furniture == task.furniture)
-        a, b = _on_the_way(motion, t - dt), _on_the_way(motion, t)
+        a, b = motion.pose(t - dt), motion.pose(t)
         return (b[0] - a[0], b[1] - a[1])
 
     def hang_door(self) -> None:
@@ -149,6 +167,19 @@ class Life:
         """Where a person can squeeze through."""
         return self._ways_of(0.16)
 
+    def clear_way(self, who: Mover, furniture: str, to: Pose) -> list[Xy]:
+        """Corners of a way for a piece of furniture past everything and everybody; empty where there is none."""
+        piece = self.room.furniture[furniture]
+        blocked = [other for other in self.room.furniture.values() if other.id not in (furniture, "door")]
+        things = [(thing.pose[:2], thing.size) for thing in self.room.things.values()]
+        things += [(other.xy, 2 * other.radius) for other in self.others(who)]
+        radius = math.hypot(piece.width, piece.depth) / 2
+        for share in (1.0, 0.8, 0.6):
+            way = Ways(self.plan, blocked, things, share * radius).path(piece.pose[:2], to[:2])
+            if way:
+                return way
+        return []
+
     def others(self, mover: Mover) -> list[Mover]:
         return [other for other in self.movers.values() if other is not mover]
 
@@ -187,7 +218,7 @@ class Life:
         for motion in self.motions:
             if motion.start <= self.now <= motion.end + 2 * STEP_S:
                 piece = self.room.furniture[motion.furniture]
-                self.room.furniture[motion.furniture] = piece.at(_on_the_way(motion, self.now))
+                self.room.furniture[motion.furniture] = piece.at(motion.pose(self.now))
                 if self.now >= self._look_again_s or self.now > motion.end:
                     self._ways.clear()
                     self._look_again_s = self.now + 0.4
@@ -199,10 +230,3 @@ class Life:
             things = [(thing.pose[:2], thing.size) for thing in self.room.things.values()]
             self._ways[radius] = Ways(self.plan, blocked, things, radius)
         return self._ways[radius]
-
-
-def _on_the_way(motion: Motion, t: float) -> Pose:
-    u = min(1.0, max(0.0, (t - motion.start) / (motion.end - motion.start)))
-    u = u * u * (3 - 2 * u)
-    a, b = motion.before, motion.after
-    return (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), a[2] + u * math.remainder(b[2] - a[2], 2 * math.pi))

@@ -23,6 +23,8 @@ _CLOSEST_M = 0.3
 #: What feet can do to speed up, slow down and turn, m/s2.
 _PUSH = 2.0
 _SWAY_M = 0.02
+#: Who gets no further for so long thinks of something else.
+_STUCK_S = 4.0
 
 
 @dataclass(slots=True)
@@ -69,6 +71,7 @@ class Mover:
         if isinstance(task, Go):
             self._face = None
             self._path = life.ways(self).path(self.xy, task.to) or []
+            self._until = t + _STUCK_S
         elif isinstance(task, Wait):
             self._until = t + task.seconds
         elif isinstance(task, Face):
@@ -88,10 +91,13 @@ class Mover:
             return True
         if isinstance(task, Go):
             self._walk(life, dt)
-            return not self._path or t - self._began > task.patience_s
+            if math.hypot(*self.velocity) > 0.1 or self.size is not None:
+                self._until = t + _STUCK_S
+            return not self._path or t > min(self._until, self._began + task.patience_s)
         if isinstance(task, Drag):
             dx, dy = life.dragged(task, t, dt)
-            self._shift((self.xy[0] + dx, self.xy[1] + dy), dt)
+            there = (self.xy[0] + dx, self.xy[1] + dy)
+            self._shift(there if life.plan.contains(there, 0.1) else self.xy, dt)
         elif isinstance(task, Sit):
             self._sit(task, t)
         else:
@@ -114,7 +120,7 @@ class Mover:
         if self.size is None:
             self._push_on(self._give_way(life.others(self), wish), life, dt)
         else:
-            self._drive(wish, life.others(self), dt)
+            self._drive(wish, life, dt)
 
     def _give_way(self, others: Sequence[Mover], wish: Xy) -> Xy:
         """Away from who is near, and past him on the right."""
@@ -142,30 +148,33 @@ class Mover:
         ways = life.tight_ways()
         for step in ((vx, vy), (vx, 0.0), (0.0, vy), (0.0, 0.0)):
             there = (self.xy[0] + step[0] * dt, self.xy[1] + step[1] * dt)
-            if (ways.is_free(there) or not ways.is_free(self.xy)) and self._has_room(there, life):
+            possible = ways.is_free(there) or ways.room_at(there) >= max(0.01, ways.room_at(self.xy))
+            if possible and self._has_room(there, life):
                 self._shift(there, dt)
                 return
 
     def _has_room(self, there: Xy, life: Life) -> bool:
         """Not nearer to anybody than one can be, or at least not nearer than now."""
         for other in life.others(self):
-            least = _CLOSEST_M if other.size is None else other.radius + 0.1
+            robots = (self.size is not None) + (other.size is not None)
+            least = _CLOSEST_M if not robots else self.radius + other.radius - (0.1 if robots == 1 else 0.0)
             apart = math.dist(there, other.xy)
             if apart < least and apart < math.dist(self.xy, other.xy) and not (other.walker and other.walker.lifted):
                 return False
         return True
 
-    def _drive(self, wish: Xy, others: Sequence[Mover], dt: float) -> None:
+    def _drive(self, wish: Xy, life: Life, dt: float) -> None:
         """A robot turns first, then goes; it waits for who is in its way."""
         heading = math.atan2(wish[1], wish[0])
         off = math.remainder(heading - self.yaw, 2 * math.pi)
         self.yaw += max(-0.9 * dt, min(0.9 * dt, off))
         pace = math.hypot(*wish) if abs(off) < 0.3 else 0.0
-        for other in others:
+        for other in life.others(self):
             ahead = (other.xy[0] - self.xy[0]) * wish[0] + (other.xy[1] - self.xy[1]) * wish[1]
             if ahead > 0 and math.dist(self.xy, other.xy) < self.radius + other.radius + 0.25:
                 pace = 0.0
-        self._shift((self.xy[0] + pace * math.cos(self.yaw) * dt, self.xy[1] + pace * math.sin(self.yaw) * dt), dt)
+        there = (self.xy[0] + pace * math.cos(self.yaw) * dt, self.xy[1] + pace * math.sin(self.yaw) * dt)
+        self._shift(there if self._has_room(there, life) else self.xy, dt)
 
     def _stand(self, dt: float) -> None:
         """Nobody stands still like a statue: the body sways round where it stopped."""

@@ -104,7 +104,7 @@ class Ways:
         for piece in furniture:
             np.minimum(clear, to_box(grid, piece.pose, piece.width, piece.depth), out=clear)
         for xy, size in things:
-            np.minimum(clear, np.hypot(grid[..., 0] - xy[0], grid[..., 1] - xy[1]) - size / 2 + 0.06, out=clear)
+            np.minimum(clear, np.hypot(grid[..., 0] - xy[0], grid[..., 1] - xy[1]) - size / 2, out=clear)
         x, y = grid[..., 0], grid[..., 1]
         sides = {door.wall for door in plan.doors}
         walkable = (x > 0) & (x < plan.width) & (y > 0) & (y < plan.depth)
@@ -116,6 +116,12 @@ class Ways:
     def is_free(self, xy: Xy) -> bool:
         i, j = self._cell(xy)
         return 0 <= i < len(self._x) and 0 <= j < len(self._y) and bool(self.free[i, j])
+
+    def room_at(self, xy: Xy) -> float:
+        """Metres to whatever is nearest; 0 where nobody can be."""
+        i, j = self._cell(xy)
+        inside = 0 <= i < len(self._x) and 0 <= j < len(self._y)
+        return float(self.clearance[i, j]) if inside else 0.0
 
     def nearest_free(self, xy: Xy) -> Xy:
         """The free place nearest to this one."""

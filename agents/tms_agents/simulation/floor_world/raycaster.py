@@ -151,7 +151,7 @@ def _meet_segment(
     ax, ay = x0 - x, y0 - y
     along = (ax * s - ay * c) / cross
     r = (ax * dy - ay * dx) / cross
-    if r <= 0 or along < 0 or along > 1:
+    if r <= 0 or along < -1e-9 or along > 1 + 1e-9:  # no beam slips through a corner
         return np.inf, 1.0
     return r, abs(cross) / math.hypot(dx, dy)
 

@@ -94,16 +94,22 @@ def _hidden(life: Life, duration: float) -> None:
         reach = gap / math.hypot(dx, dy)
         return (thing.pose[0] + reach * dx, thing.pose[1] + reach * dy, math.atan2(dy, dx) + math.pi / 2)
 
+    taken: list[Xy] = []
+
     def free(name: str, size: float, gap: float, room: float) -> Thing:
-        """With a free place before it."""
-        for _ in range(300):
+        """With a place before it that nobody else wants."""
+        for attempt in range(600):
             thing = new_thing(life, size, name)
             spot = before(thing, gap)
+            wanted = [math.dist(xy, one) < 0.9 - attempt / 1000 for xy in (thing.pose[:2], spot[:2]) for one in taken]
+            if any(wanted):
+                continue
             others = [piece for piece in life.room.furniture.values() if piece.id != "trolley"]
             clear = all(piece.distance(spot[:2]) > room for piece in others)
             if clear and life.plan.contains(spot[:2], room) and all(
                 math.dist(spot[:2], other.pose[:2]) > room + 0.2 for other in life.room.things.values()
             ):  # fmt: skip
+                taken.extend((thing.pose[:2], spot[:2]))
                 return thing
         raise RuntimeError("no place to hide a thing")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -51,6 +52,8 @@ def leave(life: Life, me: Mover) -> Story:
 def put(life: Life, me: Mover, thing: Thing) -> Story:
     """Go there, bend down, put it, get up."""
     yield from _stand_before(life, me, thing.pose[:2])
+    while any(math.dist(other.xy, thing.pose[:2]) < other.radius + 0.2 for other in life.others(me)):
+        yield Wait(0.5)
     yield Do(lambda t: life.place(thing, me.id, t))
     yield Wait(me.rng.uniform(0.4, 1.2))
 
@@ -79,7 +82,9 @@ def push(life: Life, me: Mover, furniture: str, to: Pose) -> Story:
         return
     yield Go(start)
     yield Face(piece.pose[:2])
-    yield Drag(furniture, to, max(1.5, math.dist(piece.pose[:2], to[:2]) / 0.4))
+    corners = life.clear_way(me, furniture, to)
+    far = sum(math.dist(a, b) for a, b in pairwise([piece.pose[:2], *corners]))
+    yield Drag(furniture, to, max(1.5, far / 0.4), tuple(corners))
     yield Wait(me.rng.uniform(0.5, 1.5))
 
 
@@ -136,7 +141,7 @@ def _stand_before(life: Life, me: Mover, xy: Xy) -> Story:
     for turn in np.linspace(0, 2 * math.pi, 24, endpoint=False):
         gap = me.rng.uniform(0.36, 0.46)
         spot = (xy[0] + gap * math.cos(turn), xy[1] + gap * math.sin(turn))
-        if life.plan.contains(spot, 0.15) and life.tight_ways().is_free(spot):
+        if life.plan.contains(spot, 0.22) and life.tight_ways().is_free(spot):
             spots.append(spot)
     spot = spots[me.rng.integers(len(spots))] if spots else ways.nearest_free(xy)
     yield Go(spot)

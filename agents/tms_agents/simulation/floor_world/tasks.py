@@ -37,11 +37,12 @@ class Do:
 
 @dataclass(frozen=True, slots=True)
 class Drag:
-    """Move a piece of furniture, walking beside it."""
+    """Move a piece of furniture, walking beside it; over the places ``way``, straight if there are none."""
 
     furniture: str
     to: Pose
     seconds: float
+    way: tuple[Xy, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
