@@ -11,6 +11,7 @@ seed and the bytes, where anything fails.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import gc
 import os
 import random
@@ -24,10 +25,22 @@ from typing import Any
 
 import numpy as np
 
+from tms_agents.devices.cola import ColaSession
+from tms_agents.devices.cola.framing import MAX_FRAME as MAX_COLA
+from tms_agents.devices.cola.framing import Dialect
+from tms_agents.devices.cola.framing import FrameParser as ColaParser
+from tms_agents.devices.cola.scandata import Channel, ScanData
+from tms_agents.devices.cola.values import Reader, Writer
 from tms_agents.devices.lines import LineParser
 from tms_agents.devices.llrp.codec import MAX_MESSAGE
 from tms_agents.devices.llrp.codec import FrameParser as LlrpParser
 from tms_agents.devices.llrp.session import LlrpSession
+from tms_agents.devices.lms200 import Lms200Session
+from tms_agents.devices.lms200 import messages as lms
+from tms_agents.devices.lms200.codec import MAX_FRAME as MAX_LMS
+from tms_agents.devices.lms200.codec import Frame as LmsFrame
+from tms_agents.devices.lms200.codec import FrameParser as LmsParser
+from tms_agents.devices.lms200.profiles import Profile
 from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.modbus import StatusRegister, WeighingMap
 from tms_agents.devices.scales import DialectName, ScaleLineSession
@@ -215,6 +228,70 @@ def _scale(dialect: DialectName) -> tuple[str, Callable[[], Target]]:
     )
 
 
+def _lms200(*, reflectivity: bool) -> list[bytes]:
+    """What the scanner answers while it is set up, scans of both kinds, a power-on."""
+    beams = np.arange(1000, 1181, dtype=np.uint16)
+    strength = np.arange(20, dtype=np.uint8) if reflectivity else None
+    code = lms.RANGES_AND_REFLECTIVITY if reflectivity else lms.RANGES
+    bodies = [
+        bytes([lms.reply_to(lms.SWITCH_MODE), 0]),
+        bytes([lms.reply_to(lms.TYPE)]) + b"LMS200;30106;V02.10 ",
+        bytes([lms.reply_to(lms.READ_CONFIG)]) + bytes(34),
+        bytes([lms.reply_to(lms.VARIANT), 1, 180, 0, 100, 0]),
+        bytes([lms.reply_to(lms.STATUS)]) + lms.Status(lms.STREAM, 0, 180, 1.0, "mm").encode(),
+        bytes([code]) + Profile(beams, "mm", reflectivity=strength).encode(),
+        bytes([lms.POWER_ON]) + b"LMS200",
+    ]
+    said = [b"\x06" + LmsFrame(body + b"\x00", 0x80).encode() for body in bodies]
+    set_up = b"".join([*said[:5], said[0]])
+    return [*said, *3 * [set_up + said[5]], said[5], said[5]]
+
+
+def _lms200_frames() -> Target:
+    parser = LmsParser()
+
+    def feed(data: bytes) -> None:
+        for item in parser.feed(data):
+            if isinstance(item, LmsFrame) and item.code in (lms.RANGES, lms.RANGES_AND_REFLECTIVITY):
+                with contextlib.suppress(ValueError):
+                    Profile.of(item.code, item.data).ranges(0)
+
+    samples = _lms200(reflectivity=False) + _lms200(reflectivity=True)
+    return Target(feed, lambda: parser.pending, MAX_LMS, samples)
+
+
+def _cola(dialect: Dialect) -> list[bytes]:
+    """What the scanner answers while it is set up, a scan, refusals."""
+    values = np.arange(60, dtype=np.uint16)
+    scan = ScanData((Channel("DIST1", values), Channel("RSSI1", values, bits=8)), encoders=((7, 8),))
+    answers = [
+        Writer(dialect, "sRA", "SCdevicestate").put("B", 1),
+        Writer(dialect, "sEA", "LMDscandata").put("B", 1),
+        Writer(dialect, "sRA", "DeviceIdent").text("TiM571").text("V1"),
+        Writer(dialect, "sRA", "SerialNumber").text("21010042"),
+        Writer(dialect, "sAN", "SetAccessMode").put("B", 1),
+        Writer(dialect, "sWA", "LMDscandatacfg"),
+        Writer(dialect, "sAN", "LMCstartmeas").put("B", 0),
+        Writer(dialect, "sAN", "Run").put("B", 1),
+        Writer(dialect, "sEA", "LMDscandata").put("B", 1),
+    ]
+    said = [answer.telegram().encode() for answer in answers]
+    said.append(scan.telegram(dialect).encode())
+    refusal = Writer(dialect, "sFA").put("H", 3).telegram().encode()
+    return [*said, refusal, *3 * [b"".join(said)], said[-1], said[-1]]
+
+
+def _cola_frames() -> Target:
+    parser = ColaParser()
+
+    def feed(data: bytes) -> None:
+        for telegram in parser.feed(data):
+            with contextlib.suppress(ValueError):
+                ScanData.of(Reader(telegram))
+
+    return Target(feed, lambda: parser.pending, MAX_COLA, _cola("A") + _cola("B"))
+
+
 #: Every parser of bytes that come from a device. A new driver adds its line here.
 TARGETS: list[tuple[str, Callable[[], Target]]] = [
     ("lines", _parser(LineParser, _LONGEST_TEXT, [*_BOARD, *_SCALES["and"]])),
@@ -259,6 +336,22 @@ TARGETS: list[tuple[str, Callable[[], Target]]] = [
             _scip("URG-04LX", Measure("MS", 303, 465, 3)),
         ),
     ),
+    ("lms200 frames", _lms200_frames),
+    (
+        "lms200 session",
+        _session(lambda clock: Lms200Session(resolution_deg=1.0, clock=clock), MAX_LMS, _lms200(reflectivity=False)),
+    ),
+    (
+        "lms200 reflectivity",
+        _session(
+            lambda clock: Lms200Session(output="reflectivity", resolution_deg=1.0, clock=clock),
+            MAX_LMS,
+            _lms200(reflectivity=True),
+        ),
+    ),
+    ("cola frames", _cola_frames),
+    ("cola a session", _session(lambda clock: ColaSession(clock=clock), MAX_COLA, _cola("A"))),
+    ("cola b session", _session(lambda clock: ColaSession(dialect="B", clock=clock), MAX_COLA, _cola("B"))),
 ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -171,6 +172,11 @@ class ColaDevice:
             return writer.put("I", 100 * self.scan_hz).put("H", 1).put("I", round(1e4 * self.step_deg)).put("i", *ticks)
         if name == "LMPoutputRange":
             return writer.put("H", 1).put("I", round(1e4 * self.step_deg)).put("i", *ticks)
+        if name == "LIDinputstate":
+            return writer.put("B", *[0] * 12)
+        if re.fullmatch("field[0-9]{3}", name):  # a protective field, empty; some hosts ask for all of them
+            writer.put("f", 1.0, 0.0).put("I", round(1e4 * self.step_deg)).put("i", ticks[0]).put("B", 2, 1)
+            return writer.put("H", 1, 0, 0, 0, 0, 1).text(name).put("H", 0)
         if name in ("ODoprh", "ODpwrc"):
             return writer.put("I", 1000)
         if name == "LMDscandatacfg":
