@@ -84,7 +84,7 @@ class Room:
 COMES, STOPS, PUTS, GOES, GONE = 3.0, 5.5, 6.0, 7.0, 9.0
 #: Settings for a story of seconds: learn the empty room, believe in things, quickly.
 QUICK = "[estimator]\nlearn_s = 1.5\nstart_s = 0.5\n"
-PUT_AT = (2.8, 2.45)
+PUT_AT = (2.3, 1.7)
 
 
 def story(room: Room, t: float) -> None:
