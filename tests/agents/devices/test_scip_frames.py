@@ -166,6 +166,12 @@ def test_a_reply_of_the_other_version_has_no_measurement():
     assert got.status == "E" and measurement(got) is None
 
 
+def test_a_status_is_of_letters_and_digits():
+    for status in ("\u00b99", "  ", "\x00\x00", "+1"):
+        parser = ReplyParser()
+        assert parser.feed(reply("QT", status)) == [] and parser.skipped
+
+
 def test_parameters_and_their_faults():
     good = [line.encode() for line in MODELS["UTM-30LX-EW"].parameters.lines()]
     assert Parameters.parse(good) == MODELS["UTM-30LX-EW"].parameters

@@ -64,15 +64,18 @@ async def test_a_cable_that_is_pulled_out_and_put_back():
     async with on_a_line("pty", device, tick_s=0.005) as (line, opener):
 
         def pull(item):
-            if isinstance(item, Scan) and line._ends and not device.power_cycles:
+            if isinstance(item, Scan) and not happened:
                 line.hang_up()
                 device.power_cycle()
-            elif isinstance(item, DeviceState) and item.state == "faulty" and not line._ends:
+                happened.append("out")
+            elif isinstance(item, DeviceState) and item.state == "faulty" and happened == ["out"]:
                 line.plug_in()
+                happened.append("in")
 
         def back(seen):
             return states(seen)[-1] == "connected" and "faulty" in states(seen) and isinstance(seen[-1], Scan)
 
+        happened: list[str] = []
         seen = await until(link(opener), back, pull, timeout_s=TIMEOUT_S)
     assert states(seen)[0] == "connected" and len(scans(seen)) >= 2
 
@@ -107,12 +110,12 @@ async def test_a_sensor_that_falls_silent_and_comes_back():
 
         said: list[str] = []
         seen = await until(
-            link(opener, silent_after_s=0.4),
+            link(opener, silent_after_s=0.8),
             lambda seen: "silent" in states(seen) and states(seen)[-1] == "connected" and isinstance(seen[-1], Scan),
             hush,
             timeout_s=TIMEOUT_S,
         )
-    assert states(seen)[:2] == ["connected", "silent"]
+    assert "connected" in states(seen)[: states(seen).index("silent")]
 
 
 async def test_nobody_answers():

@@ -36,6 +36,7 @@ async def test_hokuyolx_measures_with_our_sensor():
     from hokuyolx import HokuyoLX
 
     device = sensor()
+    device.motor_speed = 400  # it cannot cope with two scans in one piece
     ranges, light = room(1081)
     expected = millimetres(ranges, 65533, 0)
 
@@ -55,7 +56,7 @@ async def test_hokuyolx_measures_with_our_sensor():
         for number, (scan, stamp, pending) in enumerate(laser.iter_dist(scans=5)):
             assert scan.tolist() == expected and pending == 4 - number
             stamps.append(stamp)
-        assert len(stamps) == 5 and all(later - sooner >= 24 for sooner, later in itertools.pairwise(stamps))
+        assert len(stamps) == 5 and all(later - sooner >= 149 for sooner, later in itertools.pairwise(stamps))
         for scan, _, _ in laser.iter_intens(scans=3, skips=1):
             assert scan[:, 1].tolist() == light.astype(int).tolist()
         laser.reset()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -268,6 +269,32 @@ def test_damaged_scans_are_left_out_and_nothing_else(fault):
     # a scan that lost its end may take the next one's command with it
     assert 40 - 3 - 1 <= len(scans) <= 40 - 3 + 1 and all(sensor.is_seen(scan) for scan in scans)
     assert sensor.device.heard.count("ME0000108001000") == 1
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.sampled_from(sorted(MODELS)),
+    st.lists(
+        st.one_of(
+            st.binary(max_size=80),
+            st.sampled_from([b"SCIP2.0\n", b"BM\n", b"TM0\n", b"TM1\n", b"RB\n", b"RS\n", b"GS0100011000\n", b"%ST\n"]),
+            st.builds(
+                lambda head, tail: head + tail + b"\n",
+                st.sampled_from([b"MD", b"GE", b"MS00000100", b"SS", b"TM", b"G", b"QT;", b"HS"]),
+                st.text(st.sampled_from("0123456789 ;\u00b9A"), max_size=20).map(lambda text: text.encode("latin-1")),
+            ),
+        ),
+        max_size=12,
+    ),
+)
+def test_the_emulator_hears_anything(model, said):
+    sensor = Sensor(model)
+    sensor.device.model = dataclasses.replace(sensor.device.model, dies_of_intensity=False)
+    for data in said:
+        sensor.clock.now += 0.05
+        sensor.device.receive(data)
+        sensor.device.tick()
+    assert len(sensor.scans(4.0, step_s=0.05)) > 5
 
 
 @settings(max_examples=30, deadline=None)

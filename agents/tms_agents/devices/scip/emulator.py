@@ -238,7 +238,7 @@ class ScipDevice:
     def _set_speed(self, value: str) -> str:
         if not self.model.serial_line:
             return "0F" if self.model.states else "04"
-        if len(value) != 6 or not value.isdigit():
+        if len(value) != 6 or not (value.isascii() and value.isdigit()):
             return "01"
         if int(value) not in BAUDS:
             return "02"

@@ -23,6 +23,7 @@ _BEGINS = re.compile(rb"(?=" + _COMMAND.pattern + rb"\n(?:..)?.\n)", re.S)
 #: Not a text of the host's: the reply that has it lost its end there, and another began.
 _BROKEN_OFF = re.compile(rb";.*[MG][DSE][0-9]{10}")
 _MEASURE = re.compile(rb"[MG][DSE][0-9]{10}")
+_STATUS = re.compile(rb"[0-9A-Z]{1,2}")
 _TEXT = re.compile(rb"[ -~]*")
 _MOST_TRIES = 4
 _STAMP = 4
@@ -78,12 +79,14 @@ def parse_reply(block: bytes) -> Reply:
     status, _, rest = rest.partition(b"\n")
     if not _COMMAND.fullmatch(command) or _BROKEN_OFF.search(command):
         raise ValueError("no command")
-    name = command.decode()
-    if len(status) == 1:
-        return Reply(name, status.decode("latin-1"), _old_lines(name, rest))
-    if len(status) != 3 or checksum(status[:2]) != status[2]:
+    name, code = command.decode(), status[:2]
+    if not _STATUS.fullmatch(code):
         raise ValueError("no status")
-    return Reply(name, status[:2].decode("latin-1"), _lines(name, rest))
+    if len(status) == 1:
+        return Reply(name, code.decode(), _old_lines(name, rest))
+    if len(status) != 3 or checksum(code) != status[2]:
+        raise ValueError("a status with a wrong sum")
+    return Reply(name, code.decode(), _lines(name, rest))
 
 
 def text_line(line: bytes) -> bytes | None:
