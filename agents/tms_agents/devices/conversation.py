@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from tms_agents.devices.beat import on_the_beat
-from tms_agents.devices.sessions import DeviceState, Paced, Polled, Session
+from tms_agents.devices.sessions import DeviceState, Noted, Paced, Polled, Session
 from tms_agents.devices.streams import Stream
 
 T = TypeVar("T")
@@ -44,6 +44,7 @@ class Conversation(Generic[T]):
         self._tick_s, self._gather_s = tick_s, gather_s
         self._paced = session if isinstance(session, Paced) else None
         self._polled = isinstance(session, Polled)
+        self._noted, self._note = (session if isinstance(session, Noted) else None), ""
         self._heard: list[Sequence[T] | DeviceState] = []
         self._told_at, self._waiting = 0.0, 0
         self._well = self._urgent = False
@@ -128,8 +129,8 @@ class Conversation(Generic[T]):
         items = session.receive(data) if data else ()
         if session.frames > self._frames:
             self._alive_at, self._frames = now, session.frames
-            if session.ready and not self._well:
-                self._well = True
+            if session.ready and (not self._well or (self._noted is not None and self._noted.note != self._note)):
+                self._well, self._note = True, "" if self._noted is None else self._noted.note
                 self._tell(self._alive())
         elif states := self._silence(now - self._alive_at):
             self._well = False

@@ -55,6 +55,15 @@ class Paced(Protocol):
 
 
 @runtime_checkable
+class Noted(Protocol):
+    """A session that has something to add to the state of a device that works: what it is, what it complains of."""
+
+    @property
+    def note(self) -> str:
+        """May change at any time; empty where there is nothing to add."""
+
+
+@runtime_checkable
 class Polled(Paced, Protocol):
     """A paced session whose input is looked at when it is ticked, not at every byte: far fewer wake-ups."""
 

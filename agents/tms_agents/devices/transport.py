@@ -14,7 +14,7 @@ from collections.abc import AsyncGenerator, Callable, Sequence
 from typing import Generic, Literal, TypeVar
 
 from tms_agents.devices.conversation import Conversation
-from tms_agents.devices.sessions import DeviceFault, DeviceState, Paced, Polled, Session
+from tms_agents.devices.sessions import DeviceFault, DeviceState, Noted, Paced, Polled, Session
 from tms_agents.devices.streams import Opener, Stream, serial, tcp
 from tms_client.flows import Retry
 
@@ -23,6 +23,7 @@ __all__ = [
     "DeviceLink",
     "DeviceState",
     "Link",
+    "Noted",
     "Opener",
     "Paced",
     "Polled",
@@ -108,9 +109,11 @@ class Link(DeviceLink[T]):
     ) -> None:
         super().__init__(name=name, silent_after_s=silent_after_s, retry=retry)
         self._open, self._session, self._tick_s = opener, session, tick_s
+        self._noted: Noted | None = None
 
     async def _connection(self) -> AsyncGenerator[Sequence[T] | DeviceState, None]:
         session = self._session()  # before the stream: settings that cannot be leave nothing open
+        self._noted = session if isinstance(session, Noted) else None
         stream = await self._open()
         conversation = Conversation(
             session,
@@ -130,3 +133,7 @@ class Link(DeviceLink[T]):
             with contextlib.suppress(DeviceFault):
                 stream.write(session.closing())
             await stream.close()
+
+    def _alive(self) -> list[DeviceState]:
+        note = self._noted.note if self._noted is not None else ""
+        return self._change("connected", f"{self._name}: {note}" if note else self._name)

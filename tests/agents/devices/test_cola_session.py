@@ -293,3 +293,21 @@ async def test_a_refusal_is_the_state_of_the_link():
         (state,) = await until(link, lambda seen: states(seen), timeout_s=20)
     why = "floor: TiM571-2050101 V3.13 refuses sEN LMDscandata: error 15: unknown event"
     assert state == DeviceState("faulty", why)
+
+
+async def test_pollution_is_told_with_the_state_while_it_goes_on():
+    device = ColaDevice(Room(811))
+    async with on_a_line("tcp", device, tick_s=0.01) as (_, opener):
+
+        def pollute(item):
+            if isinstance(item, Scan):
+                device.status = (0, 2) if len(told) < 2 else (0, 0)
+            else:
+                told.append(item)
+
+        told: list[DeviceState] = []
+        link = Link(opener, ColaSession, name="floor", retry=QUICK)
+        seen = await until(link, lambda seen: len(states(seen)) == 3, pollute, timeout_s=20)
+    well = DeviceState("connected", "floor: TiM571-2050101 V3.13")
+    polluted = DeviceState("connected", "floor: TiM571-2050101 V3.13, the window is polluted")
+    assert [item for item in seen if isinstance(item, DeviceState)] == [well, polluted, well]

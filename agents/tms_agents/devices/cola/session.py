@@ -84,6 +84,10 @@ class ColaSession(Outgoing):
         """The dialect in use."""
         return self._dialects[0]
 
+    @property
+    def note(self) -> str:
+        return ", ".join(filter(None, (self.model, self.condition)))
+
     def opened(self) -> None:
         self._start()
 

@@ -81,6 +81,10 @@ class Lms200Session(Outgoing):
         self._status: m.Status | None = None
         self._running = False
 
+    @property
+    def note(self) -> str:
+        return ", ".join(filter(None, (self.model, self.condition)))
+
     def opened(self) -> None:
         self._start()
 
