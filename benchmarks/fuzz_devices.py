@@ -230,21 +230,21 @@ def _scale(dialect: DialectName) -> tuple[str, Callable[[], Target]]:
 
 def _lms200(*, reflectivity: bool) -> list[bytes]:
     """What the scanner answers while it is set up, scans of both kinds, a power-on."""
-    beams = np.arange(1000, 1181, dtype=np.uint16)
+    beams = np.arange(1000, 1101, dtype=np.uint16)
     strength = np.arange(20, dtype=np.uint8) if reflectivity else None
     code = lms.RANGES_AND_REFLECTIVITY if reflectivity else lms.RANGES
     bodies = [
         bytes([lms.reply_to(lms.SWITCH_MODE), 0]),
         bytes([lms.reply_to(lms.TYPE)]) + b"LMS200;30106;V02.10 ",
         bytes([lms.reply_to(lms.READ_CONFIG)]) + bytes(34),
-        bytes([lms.reply_to(lms.VARIANT), 1, 180, 0, 100, 0]),
-        bytes([lms.reply_to(lms.STATUS)]) + lms.Status(lms.STREAM, 0, 180, 1.0, "mm").encode(),
+        bytes([lms.reply_to(lms.VARIANT), 1, 100, 0, 100, 0]),
+        bytes([lms.reply_to(lms.STATUS)]) + lms.Status(lms.STREAM, 0, 100, 1.0, "mm").encode(),
         bytes([code]) + Profile(beams, "mm", reflectivity=strength).encode(),
         bytes([lms.POWER_ON]) + b"LMS200",
     ]
     said = [b"\x06" + LmsFrame(body + b"\x00", 0x80).encode() for body in bodies]
     set_up = b"".join([*said[:5], said[0]])
-    return [*said, *3 * [set_up + said[5]], said[5], said[5]]
+    return [*said, set_up + said[5], set_up + said[5], said[5]]
 
 
 def _lms200_frames() -> Target:
@@ -278,7 +278,7 @@ def _cola(dialect: Dialect) -> list[bytes]:
     said = [answer.telegram().encode() for answer in answers]
     said.append(scan.telegram(dialect).encode())
     refusal = Writer(dialect, "sFA").put("H", 3).telegram().encode()
-    return [*said, refusal, *3 * [b"".join(said)], said[-1], said[-1]]
+    return [*said, refusal, b"".join(said), b"".join(said), said[-1]]
 
 
 def _cola_frames() -> Target:
@@ -339,12 +339,16 @@ TARGETS: list[tuple[str, Callable[[], Target]]] = [
     ("lms200 frames", _lms200_frames),
     (
         "lms200 session",
-        _session(lambda clock: Lms200Session(resolution_deg=1.0, clock=clock), MAX_LMS, _lms200(reflectivity=False)),
+        _session(
+            lambda clock: Lms200Session(angle_deg=100, resolution_deg=1.0, clock=clock),
+            MAX_LMS,
+            _lms200(reflectivity=False),
+        ),
     ),
     (
         "lms200 reflectivity",
         _session(
-            lambda clock: Lms200Session(output="reflectivity", resolution_deg=1.0, clock=clock),
+            lambda clock: Lms200Session(output="reflectivity", angle_deg=100, resolution_deg=1.0, clock=clock),
             MAX_LMS,
             _lms200(reflectivity=True),
         ),

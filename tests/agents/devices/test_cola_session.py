@@ -240,6 +240,16 @@ def test_the_answer_to_one_question_is_none_to_another():
     assert converse(host, device, clock, 3.0)
 
 
+def test_a_method_may_say_that_it_has_begun_and_take_its_time():
+    clock, device, host = pair("LMS111", frequency_hz=25, resolution_deg=0.5)
+    answer, device.unknown = device.receive, {"mLMPsetscancfg"}
+    assert converse(host, device, clock, 8.0) == [] and device.heard.count("sMN mLMPsetscancfg") == 1
+    assert host.receive(Telegram(b"sMA mLMPsetscancfg", "B").encode()) == []
+    device.unknown = set()
+    host.receive(answer(m.scan_config(25, 0.5, -45, 225).ask("B").encode()))
+    assert converse(host, device, clock, 2.0)
+
+
 KINDS = st.sampled_from(["flip", "drop", "insert"])
 damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 3400), KINDS, st.integers(1, 255)), max_size=4)
 

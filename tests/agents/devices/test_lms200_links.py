@@ -44,7 +44,7 @@ async def test_scans_come_over_a_line(kind):
 
 
 def at_the_rate_of_the_terminal(line: PtyLine, device: Lms200Device) -> None:
-    device._host_baud = lambda: line.baud
+    device.host_baud = lambda: line.baud
 
 
 @pytest.mark.parametrize(("at", "wanted"), [(9600, 38400), (38400, 38400), (19200, 9600), (500000, 38400)])

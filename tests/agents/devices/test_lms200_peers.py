@@ -26,7 +26,7 @@ pytestmark = [
 async def run(device: Lms200Device, program: str) -> str:
     """What a program prints that measures with the device over a terminal whose rate counts."""
     async with PtyLine(device, tick_s=0.005) as line:
-        device._host_baud = lambda: line.baud
+        device.host_baud = lambda: line.baud
         process = await asyncio.create_subprocess_exec(
             PROGRAMS / program, line.path, "38400", stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
         )

@@ -102,7 +102,7 @@ class ColaSession(Outgoing):
         if self._parser.pending and now - self._heard_at > 0.3:
             self._take(self._parser.resume())
         if self._current is not None:
-            if now - self._since > (_METHOD_S if self._current.verb == "sMN" else _REPLY_S):
+            if now - self._since > _patience_s(self._current):
                 self._unanswered(self._current)
         elif now - self._since > self._patience_s:
             self._start()
@@ -257,6 +257,12 @@ class ColaSession(Outgoing):
 
     def _who(self) -> str:
         return self.model or "the scanner"
+
+
+def _patience_s(command: Command) -> float:
+    if command.name == "mLMPsetscancfg":
+        return _NEW_PACE_S
+    return _METHOD_S if command.verb == "sMN" else _REPLY_S
 
 
 class _Unwrapped:

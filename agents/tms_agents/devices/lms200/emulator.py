@@ -41,7 +41,7 @@ class Lms200Device:
         host_baud: Callable[[], int] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._scan, self._fast, self._host_baud, self._clock = scan, fast, host_baud, clock
+        self._scan, self._fast, self.host_baud, self._clock = scan, fast, host_baud, clock
         self.name = "LMS291;S14;V02.10 " if fast else "LMS200;30106;V02.10 "
         self.config = m.Config(_FACTORY[:4] + bytes([2 * indices]) + _FACTORY[5:])
         self.silent = False
@@ -100,7 +100,7 @@ class Lms200Device:
         return b"" if self._noise() else self._out(answer)
 
     def _noise(self) -> bool:
-        return self._host_baud is not None and self._host_baud() != self.baud
+        return self.host_baud is not None and self.host_baud() != self.baud
 
     def _out(self, answer: bytes) -> bytes:
         return b"" if self.silent else answer
