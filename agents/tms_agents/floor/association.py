@@ -1,80 +1,80 @@
-"""Which cluster is whose foot: movers that are believed choose first, then those that are not yet (two stages)."""
+"""Which cluster is whose foot: several hypotheses side by side, so that a crossing is decided when it is over."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
-from tms_agents.floor.bodies import UNLIKELY, begin, costs, update
+from tms_agents.floor.assignment import assign
+from tms_agents.floor.bodies import UNLIKELY, begin, costs, known, narrow, predict, update
+from tms_agents.floor.freespace import FREE, clear
 from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.state import free_slot
+from tms_agents.floor.state import BODY, empty
 
 Array = NDArray[np.float64]
 
+#: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and than its parent's best.
+_KEPT, _WORSE, _BRANCH = 8, 14.0, 7.0
+_CHILDREN = 32
+#: Negative log likelihood of missing somebody in clear view in one scan.
+_MISS = 2.0
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
+_BLANK = np.zeros(1, CLUSTER)
 
 
-def associate(clusters: Any, of: NDArray[np.int64], prints: Any, bodies: Any, t: float) -> NDArray[np.bool_]:
-    """Update ``bodies`` with the clusters (m,) of one scan, begin new ones; which clusters (m,) are somebody's."""
-    free = np.ones(clusters.size, np.bool_)
-    used = bodies["used"] == 1
-    confirmed = bodies["confirmed"] == 1
-    for rows in (np.flatnonzero(used & confirmed), np.flatnonzero(used & ~confirmed)):
-        if rows.size:
-            _assign(clusters, of, free, prints, bodies, rows, t)
-    for k in np.flatnonzero(free):
-        cluster = clusters[k]
-        single = cluster["n"] == 1 and cluster["spacing"] < 0.025
-        if single or t - prints[of[k]]["first"] > _FRESH_S:
-            continue
-        slot = free_slot(bodies)
-        if slot < 0:
-            break
-        if _crowded(cluster, bodies):
-            continue
-        begin(bodies[slot], cluster, of[k], t)
-    return ~free
-
-
-def _crowded(cluster: Any, bodies: Any) -> bool:
+@njit(cache=True)
+def _crowded(c: Any, bodies: Any) -> bool:
     """Whether somebody's foot is so near that this is hardly another body."""
-    x, y = cluster["x"], cluster["y"]
-    near = np.minimum(np.hypot(bodies["ax"] - x, bodies["ay"] - y), np.hypot(bodies["bx"] - x, bodies["by"] - y))
-    return bool(((bodies["used"] == 1) & (near < 0.22)).any())
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
+            return True
+    return False
 
 
-def _assign(
+@njit(cache=True)
+def _rows(bodies: Any, confirmed: int, rows: NDArray[np.int64]) -> int:
+    count = 0
+    for b in range(bodies.size):
+        if bodies[b].used and bodies[b].confirmed == confirmed:
+            rows[count] = b
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _apply(
+    bodies: Any,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
     clusters: Any,
     of: NDArray[np.int64],
     free: NDArray[np.bool_],
+    blank: Any,
     prints: Any,
-    bodies: Any,
-    rows: NDArray[np.int64],
     t: float,
 ) -> None:
-    """One stage: the assignment of free clusters to the feet of the bodies ``rows`` that is most probable together."""
-    cost = np.empty((clusters.size, 2 * rows.size))
-    costs(clusters, of, free, prints, bodies, rows, t, cost)
-    feet: dict[int, int] = {}
-    if clusters.size and (cost < UNLIKELY).any():
-        which, columns = linear_sum_assignment(np.minimum(cost, 60.0))
-        for k, column in zip(which.tolist(), columns.tolist(), strict=True):
-            if cost[k, column] < UNLIKELY:
-                feet[column] = k
-                free[k] = False
-    blank = clusters[0] if clusters.size else _BLANK[0]
-    for column, row in enumerate(rows.tolist()):
-        a, b = feet.get(2 * column, -1), feet.get(2 * column + 1, -1)
+    """Update the bodies ``rows`` (k,) with the clusters (m,) whose ``columns`` (m,) are their feet."""
+    k = rows.size
+    feet = np.full(2 * k, -1)
+    for i in range(clusters.size):
+        if free[i] and 0 <= columns[i] < 2 * k:
+            feet[columns[i]] = i
+            free[i] = False
+    for column in range(k):
+        a, b = feet[2 * column], feet[2 * column + 1]
+        one = clusters[a] if a >= 0 else blank[0]
+        two = clusters[b] if b >= 0 else blank[0]
         update(
-            bodies[row],
-            clusters[a] if a >= 0 else blank,
+            bodies[rows[column]],
+            one,
             a >= 0,
             of[a] if a >= 0 else -1,
-            clusters[b] if b >= 0 else blank,
+            two,
             b >= 0,
             of[b] if b >= 0 else -1,
             prints,
@@ -82,4 +82,189 @@ def _assign(
         )
 
 
-_BLANK = np.zeros(1, CLUSTER)
+@njit(cache=True)
+def _complete(
+    bodies: Any, clusters: Any, of: NDArray[np.int64], free: NDArray[np.bool_], blank: Any, prints: Any, t: float
+) -> None:
+    """What the believed movers have left goes to those not yet believed, and then begins new ones."""
+    m = clusters.size
+    scratch = np.empty(bodies.size, np.int64)
+    k = _rows(bodies, 0, scratch)
+    rows = scratch[:k]
+    if k:
+        columns = np.full(m, -1)
+        if m:
+            cost = np.empty((m, 2 * k + m))
+            costs(clusters, of, free, prints, bodies, rows, t, cost)
+            assign(cost, columns)
+        _apply(bodies, rows, columns, clusters, of, free, blank, prints, t)
+    for i in range(m):
+        c = clusters[i]
+        if (
+            not free[i]
+            or narrow(c)
+            or c.attached
+            or (of[i] >= 0 and t - prints[of[i]].first > _FRESH_S)
+            or _crowded(c, bodies)
+        ):
+            continue
+        for b in range(bodies.size):
+            if not bodies[b].used:
+                begin(bodies[b], c, of[i], t)
+                break
+
+
+@njit(cache=True)
+def _same(one: Any, two: Any) -> bool:
+    """Whether two hypotheses say the same of the movers: every label at the same place on the same prints."""
+    for b in range(one.size):
+        p, q = one[b], two[b]
+        if not (p.used and p.confirmed) and not (q.used and q.confirmed):
+            continue
+        if p.used != q.used or p.label != q.label or abs(p.x - q.x) > 0.06 or abs(p.y - q.y) > 0.06:
+            return False
+        straight = p.a_print == q.a_print and p.b_print == q.b_print
+        if not straight and not (p.a_print == q.b_print and p.b_print == q.a_print):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
+    """Negative log likelihood of not having seen those of the movers ``rows`` (k,) that were in clear view."""
+    ranges, states, longest, pose, first, step = sight
+    total = 0.0
+    for b in rows:
+        body = bodies[b]
+        waits = body.seen < t and not body.stale and t - body.seen < 1.0
+        if waits and clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
+            total += _MISS
+    return total
+
+
+@njit(cache=True)
+def _advance(
+    hypotheses: Any,
+    spare: Any,
+    scores: Array,
+    count: int,
+    clusters: Any,
+    of: NDArray[np.int64],
+    blank: Any,
+    prints: Any,
+    t: float,
+    sight: Any,
+    taken: NDArray[np.bool_],
+) -> int:
+    """One scan for all ``hypotheses`` (kept, n) of bodies, best first, with ``scores`` (kept,): how many there are.
+
+    ``taken`` (m,) becomes which clusters are somebody's in the best.
+    """
+    n, m = hypotheses.shape[1], clusters.size
+    rows = np.empty(n, np.int64)
+    child_score = np.full(_CHILDREN, np.inf)
+    child_parent = np.full(_CHILDREN, -1)
+    child_columns = np.full((_CHILDREN, max(m, 1)), -1)
+    children = 0
+    everything = np.ones(m, np.bool_)
+    for h in range(count):
+        bodies = hypotheses[h]
+        predict(bodies, t)
+        k = _rows(bodies, 1, rows)
+        if m == 0 or k == 0:
+            if children < _CHILDREN:
+                child_score[children], child_parent[children] = scores[h], h
+                children += 1
+            continue
+        cost = np.empty((m, 2 * k + m))
+        costs(clusters, of, everything, prints, bodies, rows[:k], t, cost)
+        known(clusters, bodies, t, cost[:, 2 * k :])
+        columns = np.full(m, -1)
+        best = assign(cost, columns)
+        if children < _CHILDREN:
+            child_score[children], child_parent[children] = scores[h] + best, h
+            child_columns[children] = columns
+            children += 1
+        other = np.full(m, -1)
+        for i in range(m):
+            mine = columns[i] // 2
+            if columns[i] >= 2 * k or children >= _CHILDREN:
+                continue
+            rival = False
+            for j in range(2 * k + m):
+                if j // 2 != mine and cost[i, j] < cost[i, columns[i]] + 2.0 * _BRANCH:
+                    rival = True
+            if not rival:
+                continue
+            one, two = cost[i, 2 * mine], cost[i, 2 * mine + 1]
+            cost[i, 2 * mine], cost[i, 2 * mine + 1] = UNLIKELY, UNLIKELY
+            total = assign(cost, other)
+            cost[i, 2 * mine], cost[i, 2 * mine + 1] = one, two
+            if total - best < _BRANCH:
+                child_score[children], child_parent[children] = scores[h] + total, h
+                child_columns[children] = other
+                children += 1
+    owned = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_)
+    order = np.argsort(child_score[:children])
+    kept = 0
+    least = child_score[order[0]]
+    for o in order:
+        if kept == hypotheses.shape[0] or child_score[o] > least + _WORSE:
+            break
+        bodies = spare[kept]
+        parent = hypotheses[child_parent[o]]
+        for b in range(n):
+            bodies[b] = parent[b]
+        k = _rows(bodies, 1, rows)
+        free = np.ones(m, np.bool_)
+        _apply(bodies, rows[:k], child_columns[o], clusters, of, free, blank, prints, t)
+        _complete(bodies, clusters, of, free, blank, prints, t)
+        missed = _missed(bodies, rows[:k], t, sight)
+        known_already = False
+        for j in range(kept):
+            if _same(spare[j], bodies):
+                known_already = True
+                break
+        if known_already:
+            continue
+        for i in range(m):
+            owned[kept, i] = not free[i]
+        scores[kept] = child_score[o] - least + missed
+        kept += 1
+    best = int(np.argmin(scores[:kept]))
+    for h in range(kept):
+        source = best if h == 0 else (0 if h == best else h)
+        for b in range(n):
+            hypotheses[h, b] = spare[source, b]
+    scores[0], scores[best] = scores[best], scores[0]
+    scores[:kept] -= scores[0]
+    for i in range(m):
+        taken[i] = owned[best, i]
+    return kept
+
+
+class Association:
+    """The hypotheses about who is where; the best is ``bodies`` (n,) of `state.BODY`."""
+
+    def __init__(self, most: int) -> None:
+        self._hypotheses, self._spare = empty(BODY, (_KEPT, most)), empty(BODY, (_KEPT, most))
+        self._scores = np.zeros(_KEPT)
+        self._count = 1
+        self.bodies = self._hypotheses[0]
+
+    def step(self, clusters: Any, of: NDArray[np.int64], prints: Any, t: float, sight: Any) -> NDArray[np.bool_]:
+        """Take in the clusters (m,) of a scan, their prints ``of`` (m,), `View.sight`: which are somebody's."""
+        taken = np.zeros(clusters.size, np.bool_)
+        self._count = _advance(
+            self._hypotheses, self._spare, self._scores, self._count, clusters, of, _BLANK, prints, t, sight, taken
+        )
+        return taken
+
+    def decide(self) -> None:
+        """From now on only the best hypothesis counts."""
+        self._count = 1
+        self._scores[0] = 0.0
+
+    def forget(self, index: int) -> None:
+        """The mover at ``index`` has gone, whatever hypothesis holds."""
+        self._hypotheses["used"][: self._count, index] = 0

@@ -108,18 +108,15 @@ def _learn(
     empty: Array,
     beyond: Array,
     beyond_at: Array,
-    longest: Array,
-    gone: Array,
-) -> int:
+    missing: Array,
+) -> None:
     """Update the components in place, except of the beams in ``keep`` (n,): those show something known.
 
     rate: by how much this scan counts; pull: by how much the nearest component follows. ``beyond`` (n,) s counts how
-    long a beam has passed its background and ``beyond_at`` (n,) m where to: then the background there has gone, and
-    ``gone`` (n,) m is where it was (0 elsewhere). How many have gone.
+    long a beam has passed its background and ``beyond_at`` (n,) m where to: then the background there has gone.
+    ``missing`` (n, k) s is for how long beams have passed the place of a component since it was last seen.
     """
     n, k = centre.shape
-    count = 0
-    gone[:] = 0.0
     for i in range(n):
         r = ranges[i]
         if keep[i] or np.isnan(r):
@@ -142,7 +139,10 @@ def _learn(
         empty[i] *= 1.0 - rate
         for j in range(k):
             weight[i, j] *= 1.0 - rate
+            if weight[i, j] > 0.0 and r > centre[i, j] + max(threshold, sigmas * sigma[i, j]):
+                missing[i, j] += dt
         if best >= 0:
+            missing[i, best] = 0.0
             weight[i, best] += rate
             gain = max(pull, rate)
             step = r - centre[i, best]
@@ -152,6 +152,7 @@ def _learn(
         else:
             best = least
             centre[i, best], sigma[i, best], weight[i, best] = r, 2.0 * floor, rate
+            missing[i, best] = 0.0
         if states[i] == BEYOND:
             if abs(r - beyond_at[i]) > 4.0 * threshold:
                 beyond[i] = 0.0
@@ -160,16 +161,12 @@ def _learn(
             if beyond[i] > raise_after:
                 beyond[i] = 0.0
                 if weight[i, best] < 0.4:
-                    if np.isfinite(longest[i]) and r > longest[i] + 2.0 * threshold:
-                        gone[i] = longest[i]
-                        count += 1
                     for j in range(k):
                         weight[i, j] *= 0.6
                     empty[i] *= 0.6
                     weight[i, best] = 0.4
         elif states[i] == BACKGROUND:
             beyond[i] = max(0.0, beyond[i] - dt)
-    return count
 
 
 @njit(cache=True)
@@ -215,7 +212,7 @@ class Background:
         self.beyond_at = np.zeros(n)
         self.states = np.zeros(n, np.int8)
         self.longest = np.full(n, np.inf)
-        self.gone = np.zeros(n)
+        self.missing = np.zeros((n, _COMPONENTS))
         self.seconds = 0.0
         self._scans = 0
 
@@ -248,18 +245,15 @@ class Background:
         )
         return self.states
 
-    def learn(self, ranges: Array, keep: NDArray[np.bool_], dt: float) -> bool:
-        """Learn from a classified scan, ``dt`` seconds after the last, all but the beams in ``keep``.
-
-        Whether background has gone somewhere: ``gone`` (n,) m then tells where it was.
-        """
+    def learn(self, ranges: Array, keep: NDArray[np.bool_], dt: float) -> None:
+        """Learn from a classified scan, ``dt`` seconds after the last, all but the beams in ``keep``."""
         self._scans += 1
         dt = min(dt, 1.0)
         self.seconds += dt
         rate = max(1.0 / self._scans, dt / self._settings.forget_s)
         if not self.learned:
             rate = 1.0 / self._scans
-        count = _learn(
+        _learn(
             ranges,
             keep,
             rate,
@@ -275,10 +269,8 @@ class Background:
             self.empty,
             self.beyond,
             self.beyond_at,
-            self.longest,
-            self.gone,
+            self.missing,
         )
-        return bool(count and self.learned)
 
     def adopt(self, beams: NDArray[np.int64], ranges: Array, share: float = 0.3) -> None:
         """Something that stands there belongs to the room: (m,) beams and their ranges (m,) m."""
@@ -295,7 +287,7 @@ class Background:
 
     # --- across restarts
 
-    _ARRAYS = ("centre", "sigma", "weight", "empty", "beyond", "beyond_at")
+    _ARRAYS = ("centre", "sigma", "weight", "empty", "beyond", "beyond_at", "missing")
 
     def save(self) -> tuple[dict[str, Array], dict[str, float]]:
         """Arrays and numbers to keep."""

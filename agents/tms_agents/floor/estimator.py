@@ -8,8 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tms_agents.floor.association import associate
-from tms_agents.floor.bodies import predict
+from tms_agents.floor.association import Association
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, look
 from tms_agents.floor.furniture import Furniture
@@ -17,14 +16,14 @@ from tms_agents.floor.masks import Masks
 from tms_agents.floor.objects import Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.settings import FloorSettings, Scene, Sensor
-from tms_agents.floor.state import BODY, PRINT, THING, empty, pack, unpack
+from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.tracks import Tracks
 from tms_agents.floor.view import View
 
 Array = NDArray[np.float64]
 
 #: As many as there can be at once.
-_BODIES, _PRINTS, _THINGS = 48, 192, 128
+_BODIES, _PRINTS, _THINGS = 32, 192, 128
 
 
 class FloorEstimator:
@@ -43,7 +42,8 @@ class FloorEstimator:
         }
         self._masks = Masks(self._scene.region, self._scene.masks)
         self._prints = empty(PRINT, _PRINTS)
-        self._tracks = Tracks(empty(BODY, _BODIES), self._settings, self._scene)
+        self._association = Association(_BODIES)
+        self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
         self._looks = np.zeros(_THINGS, LOOK)
@@ -74,9 +74,7 @@ class FloorEstimator:
         events: list[FloorEvent] = []
         if background.ready:
             events = self._understand(view, states, t, dt)
-        if background.learn(view.ranges, view.claimed, dt):
-            beams = np.flatnonzero(background.gone)
-            self._furniture.revealed(t, beams, background.gone[beams], view.rays)
+        background.learn(view.ranges, view.claimed, dt)
         return events
 
     def labels(self) -> list[FloorLabel]:
@@ -102,8 +100,7 @@ class FloorEstimator:
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.rays))
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
-        predict(bodies, t)
-        somebodys = associate(clusters, of, prints, bodies, t)
+        somebodys = self._association.step(clusters, of, prints, t, view.sight)
         attend(prints, bodies, t)
         vanished = objects.weigh(self._looks, bodies, t, dt)
         movers = self._tracks.review(t, dt, view.sight, self._new_label)
@@ -118,7 +115,9 @@ class FloorEstimator:
         """A print rests: it is an object or furniture."""
         q = self._prints[index]
         started = min(view.background.seconds for view in self._views.values())
-        if not is_object or t - q["first"] > started - self._settings.learn_s or self._furniture.explains(q, t):
+        pieces = [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]
+        known = t - q["first"] > started - self._settings.learn_s
+        if not is_object or known or self._furniture.explains(q, pieces, t):
             q["revealed"] = 2
             return []
         who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})

@@ -1,88 +1,114 @@
-"""Furniture that was moved: where the background has gone, and new things nearby that are what has gone from there."""
+"""Furniture that was moved: pieces of the background that have gone, and new things nearby that are these pieces."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Furniture is pushed so far at most (m), and stands again so long after its old place was seen free (s).
-_PUSHED_M, _PUSHED_S = 1.3, 30.0
+#: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free.
+_PUSHED_M, _PUSHED_S = 1.3, 40.0
+#: A thin piece (m), like the leg of a chair, tells only together with another so near it (m) that went so soon (s).
+_THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
+#: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
+_GONE_S, _WEIGHT = 0.8, 0.12
 
 
 @dataclass(slots=True)
-class Spot:
-    """Where the background has gone: a piece of it, ``width`` m wide."""
+class Piece:
+    """A piece of the background that is not there now: where it was, ``width`` m wide, and when it went."""
 
     t: float
     x: float
     y: float
     width: float
-    matched: bool = False
+
+
+@njit(cache=True)
+def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: float, t: float, out: Array) -> int:
+    """Group missing components of neighbouring beams to rows of ``out`` (m, 4): t, x, y, width; how many."""
+    n, k = centre.shape
+    count = 0
+    last, last_r = -10, 0.0
+    first, x, y, r_sum, beams, gone = 0, 0.0, 0.0, 0.0, 0, 0.0
+    for i in range(n + 1):
+        r, seconds = 0.0, 0.0
+        if i < n:
+            for j in range(k):
+                if weight[i, j] > _WEIGHT and missing[i, j] > _GONE_S and (r == 0.0 or centre[i, j] < r):
+                    r, seconds = centre[i, j], missing[i, j]
+        joined = r > 0.0 and beams > 0 and i - last <= 2 and abs(r - last_r) < 0.12
+        if beams > 0 and not joined and (r > 0.0 or i - last > 2 or i == n):
+            if count < out.shape[0]:
+                out[count, 0] = t - gone / beams
+                out[count, 1], out[count, 2] = x / beams, y / beams
+                out[count, 3] = (last - first + 1) * step * r_sum / beams
+                count += 1
+            beams = 0
+        if r > 0.0:
+            if beams == 0:
+                first, x, y, r_sum, gone = i, 0.0, 0.0, 0.0, 0.0
+            x += rays[i, 0] + r * rays[i, 2]
+            y += rays[i, 1] + r * rays[i, 3]
+            r_sum += r
+            gone += seconds
+            beams += 1
+            last, last_r = i, r
+    return count
 
 
 class Furniture:
-    """Remembers where the background has gone lately."""
+    """Matches new things with pieces of the background that have gone."""
 
     def __init__(self) -> None:
-        self.spots: deque[Spot] = deque(maxlen=64)
+        #: Where pieces were that are found again: t, x, y.
+        self._found: list[tuple[float, float, float]] = []
+        self._rows = np.zeros((128, 4))
 
-    def revealed(self, t: float, beams: NDArray[np.int64], old: Array, rays: Array) -> None:
-        """The background of ``beams`` (m,) at ``old`` (m,) m has gone."""
-        start = 0
-        for i in range(1, beams.size + 1):
-            if i < beams.size and beams[i] - beams[i - 1] <= 3 and abs(old[i] - old[i - 1]) < 0.15:
-                continue
-            b, r = beams[start:i], old[start:i]
-            x, y = rays[b, 0] + r * rays[b, 2], rays[b, 1] + r * rays[b, 3]
-            spacing = float(r.mean()) * 0.006
-            width = math.hypot(x[-1] - x[0], y[-1] - y[0]) + spacing
-            self._add(Spot(t, float(x.mean()), float(y.mean()), width))
-            start = i
+    def pieces(self, view: Any, t: float) -> list[Piece]:
+        """What has gone from the background of the sensor."""
+        b = view.background
+        count = _pieces(b.centre, b.weight, b.missing, view.rays, abs(view.step), t, self._rows)
+        return [Piece(*row) for row in self._rows[:count].tolist()]
 
-    def _add(self, spot: Spot) -> None:
-        """A piece is often revealed beam by beam."""
-        for other in self.spots:
-            away = math.hypot(other.x - spot.x, other.y - spot.y)
-            if not other.matched and spot.t - other.t < 5.0 and away < 0.5 * (other.width + spot.width) + 0.03:
-                other.width = max(other.width, spot.width, away + 0.5 * (other.width + spot.width))
-                other.t = spot.t
-                return
-        self.spots.append(spot)
-
-    def explains(self, print_: Any, t: float) -> bool:
+    def explains(self, print_: Any, pieces: list[Piece], t: float) -> bool:
         """Whether the print is a piece of furniture that has gone from somewhere near; each piece explains one."""
+        self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
+        near = [p for p in pieces if math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
+        near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0 and p.t > t - 3 * _PUSHED_S]
         best, best_cost = None, 1.0
-        for spot in self.spots:
-            away = math.hypot(spot.x - print_["x"], spot.y - print_["y"])
-            if spot.matched or away > _PUSHED_M or not -_PUSHED_S < print_["first"] - spot.t < _PUSHED_S:
+        width = float(print_["width"])
+        for piece in near:
+            if any(math.hypot(piece.x - x, piece.y - y) < 0.05 for _, x, y in self._found):
                 continue
-            difference = abs(spot.width - print_["width"]) / (0.03 + 0.4 * max(spot.width, float(print_["width"])))
-            cost = 0.5 * away / _PUSHED_M + 0.5 * difference
-            if difference < 1.0 and cost < best_cost:
-                best, best_cost = spot, cost
+            difference = abs(piece.width - width) / (0.025 + 0.4 * max(piece.width, width))
+            cost = 0.3 * math.hypot(piece.x - print_["x"], piece.y - print_["y"]) / _PUSHED_M + 0.7 * difference
+            if difference < 1.0 and cost < best_cost and (width > _THIN_M or self._grouped(piece, pieces)):
+                best, best_cost = piece, cost
         if best is None:
             return False
-        best.matched = True
+        self._found.append((t, best.x, best.y))
         return True
 
-    def beside(self, x: float, y: float, t: float) -> bool:
-        """Whether something at (x, y) began where background was that has gone since."""
+    @staticmethod
+    def _grouped(piece: Piece, pieces: list[Piece]) -> bool:
         return any(
-            math.hypot(spot.x - x, spot.y - y) < 0.15 + 0.5 * spot.width and t - spot.t < _PUSHED_S
-            for spot in self.spots
+            other is not piece
+            and 0.06 < math.hypot(other.x - piece.x, other.y - piece.y) < _GROUP_M
+            and abs(other.t - piece.t) < _GROUP_S
+            for other in pieces
         )
 
     def save(self) -> list[list[float]]:
         """What to keep across a restart."""
-        return [[s.t, s.x, s.y, s.width, float(s.matched)] for s in self.spots]
+        return [list(item) for item in self._found]
 
     def restore(self, rows: list[list[float]]) -> None:
         """Go on from what was kept."""
-        self.spots = deque((Spot(t, x, y, w, bool(m)) for t, x, y, w, m in rows), maxlen=64)
+        self._found = [(t, x, y) for t, x, y in rows]

@@ -68,6 +68,10 @@ def _ripe(
         age = t - q.first
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
+        if q.attached > 0.5:
+            ripe[j] = 2
+            count += 1
+            continue
         if q.spread > 0.03:
             continue
         # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.

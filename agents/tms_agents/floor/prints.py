@@ -75,6 +75,7 @@ def follow(
             q.used, q.first, q.hits, q.looks, q.whole = 1, t, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last = t
+            q.attached = c.attached
             q.owner, q.owned, q.busy, q.revealed = -1, -1e9, -1e9, 0
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
@@ -88,6 +89,7 @@ def follow(
         q.hits += 1
         q.looks += 1
         q.last = t
+        q.attached += 0.15 * (c.attached - q.attached)
         q.sensor, q.first_beam, q.last_beam = sensor, c.first, c.last
         if not c.cut or q.whole == 0:
             if not c.cut:

@@ -8,12 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.background import FOREGROUND
+from tms_agents.floor.background import BACKGROUND, FOREGROUND
 
 Array = NDArray[np.float64]
 
 #: A cluster in the room frame: (x, y) m of the middle of the thing, (width m) across the beams, (n) beams, (near) its
-#: range, (first, last) beam, (cut) partly hidden behind something nearer, (mirror) seen in a mirror (-1: directly).
+#: range, (first, last) beam, (cut) partly hidden behind something nearer, (attached) its surface goes on as background:
+#: a piece of furniture or wall, (mirror) seen in a mirror (-1: directly).
 CLUSTER = np.dtype(
     [
         ("x", "f8"),
@@ -25,11 +26,38 @@ CLUSTER = np.dtype(
         ("first", "i8"),
         ("last", "i8"),
         ("cut", "i8"),
+        ("attached", "i8"),
         ("mirror", "i8"),
     ]
 )
 #: The middle of a thing lies behind the surface seen by this share of its width (discs 0.39, boxes 0.3 to 0.5).
 _DEPTH = 0.37
+#: A jump between surfaces (m); the parts of one thing behind a thin post are at most so far apart (m, beams).
+_EDGE_M, _HIDDEN_M, _BRIDGE = 0.08, 0.15, 40
+#: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
+_SMOOTH_M, _SMOOTH_PER_M = 0.01, 0.006
+
+
+@njit(cache=True)
+def _flickers(ranges: Array, i: int) -> bool:
+    """Whether beam i is alone between a nearer and a farther surface: it saw a bit of both."""
+    n = ranges.size
+    before = ranges[i - 1] if i > 0 else np.inf
+    after = ranges[i + 1] if i < n - 1 else np.inf
+    r = ranges[i]
+    return bool(min(before, after) < r - _EDGE_M and not max(before, after) < r + _EDGE_M)
+
+
+@njit(cache=True)
+def _goes_on(ranges: Array, beside: int, edge: int, end: int) -> bool:
+    """Whether the surface seen from beam ``edge`` to ``end`` goes on in the beam ``beside`` it."""
+    slope = 0.0
+    if edge != end:
+        inner = edge + (1 if end > edge else -1)
+        slope = ranges[edge] - ranges[inner]
+        if np.isnan(slope) or abs(slope) > 0.03:
+            slope = 0.0
+    return bool(abs(ranges[beside] - ranges[edge] - slope) < _SMOOTH_M + _SMOOTH_PER_M * ranges[edge])
 
 
 @njit(cache=True)
@@ -57,12 +85,22 @@ def _segment(
         r = ranges[i]
         mirrored = r > rays[i, 8]
         joined = False
-        if count > 0 and i - last <= 2 and (clusters[count - 1].mirror >= 0) == mirrored:
+        if _flickers(ranges, i):
+            continue
+        if count > 0 and (clusters[count - 1].mirror >= 0) == mirrored and i - last <= _BRIDGE:
             before = ranges[last]
             angle = step[last] * (i - last)
             reach = min(r, before) * np.sin(angle) / np.sin(max(grazing - angle, 0.02)) + 0.012 + 0.004 * r
             gap = np.sqrt(r * r + before * before - 2.0 * r * before * np.cos(angle))
-            joined = gap < reach
+            if i - last <= 2:
+                joined = gap < reach
+            elif gap < _HIDDEN_M:
+                # A thin leg of a table may stand before the middle of one thing.
+                joined = True
+                for b in range(last + 1, i):
+                    if not ranges[b] < min(r, before) - 0.05:
+                        joined = False
+                        break
         if not joined:
             if count == clusters.size:
                 break
@@ -94,6 +132,11 @@ def _segment(
         by = rays[b, o + 1] + ranges[b] * rays[b, o + 3]
         c.spacing = c.near * step[min(a, n - 1)]
         c.width = np.hypot(ax - bx, ay - by) + c.spacing
+        c.attached = 0
+        if a > 0 and (states[a - 1] == BACKGROUND or claimed[a - 1]) and _goes_on(ranges, a - 1, a, b):
+            c.attached = 1
+        if b < n - 1 and (states[b + 1] == BACKGROUND or claimed[b + 1]) and _goes_on(ranges, b + 1, b, a):
+            c.attached = 1
         c.cut = 0
         for side in (a - 1, a - 2, b + 1, b + 2):
             if 0 <= side < n and ranges[side] < c.near - 0.1 and not np.isnan(ranges[side]):

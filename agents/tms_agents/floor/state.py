@@ -26,6 +26,7 @@ PRINT = np.dtype(
         ("beams", "f8"),
         ("near", "f8"),
         ("spacing", "f8"),
+        ("attached", "f8"),
         ("owner", "i8"),
         ("owned", "f8"),
         ("busy", "f8"),
@@ -78,6 +79,14 @@ BODY = np.dtype(
         ("told_at", "f8"),
         ("from_furniture", "i8"),
         ("clear", "f8"),
+        ("score", "f8"),
+        ("a_vx", "f8"),
+        ("a_vy", "f8"),
+        ("b_vx", "f8"),
+        ("b_vy", "f8"),
+        ("stride", "f8"),
+        ("side", "f8"),
+        ("lone", "f8"),
     ]
 )
 
@@ -101,7 +110,7 @@ THING = np.dtype(
 )
 
 
-def empty(kind: np.dtype[Any], capacity: int) -> Any:
+def empty(kind: np.dtype[Any], capacity: int | tuple[int, int]) -> Any:
     """An array of ``capacity`` unused records."""
     return np.zeros(capacity, kind)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.association import Association
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.masks import Area
@@ -19,12 +20,26 @@ Array = NDArray[np.float64]
 
 #: What `_review` finds of a body.
 _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
+#: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
+_LONE_S = 6.0
+#: Two of them so near each other (m) are one.
+_UNITE_M = 0.35
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 #: A seated person's feet vanish so near the seat (m).
 _SEAT_M = 0.45
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
+
+
+@njit(cache=True)
+def _is_lone(body: Any, t: float) -> bool:
+    """Whether of a person only one thing is seen, which has not moved for some time."""
+    if body.robot or body.wide > 0.6 or body.width > 0.2:
+        return False
+    a, b = t - body.a_seen, t - body.b_seen
+    since = body.a_since if a < b else body.b_since
+    return bool(max(a, b) > 1.0 and t - since > 1.0)
 
 
 @njit(cache=True)
@@ -67,11 +82,15 @@ def _review(
                     beside = min(beside, np.hypot(bodies[o].x - body.x, bodies[o].y - body.y))
             needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
             needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
-            if age >= needed_s and way >= needed_m and body.hits >= 4:
+            if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= 3.0:
                 actions[b] = _CONFIRM
             continue
         if unseen == 0.0:
-            if body.stale:
+            body.lone = body.lone + dt if _is_lone(body, t) else 0.0
+            if body.lone > _LONE_S:
+                # One thing that does not move is no person: whoever it was is somewhere else.
+                actions[b] = _LOST
+            elif body.stale:
                 actions[b] = _BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
                 actions[b] = _MOVED
@@ -93,13 +112,14 @@ def _review(
 class Tracks:
     """Movers: which of ``bodies`` are believed, their labels and events."""
 
-    def __init__(self, bodies: Any, settings: FloorSettings, scene: Scene) -> None:
-        self.bodies = bodies
+    def __init__(self, association: Association, settings: FloorSettings, scene: Scene) -> None:
+        self._association = association
+        self.bodies = association.bodies
         self._settings = settings
         self._seats, self._gates = Area(scene.seats), Area(scene.gates)
         self._region = Area([] if scene.region is None else [scene.region])
         self._robots = [tuple(sorted(size)) for size in scene.robots]
-        self._actions = np.zeros(bodies.size, np.int64)
+        self._actions = np.zeros(self.bodies.size, np.int64)
 
     def review(self, t: float, dt: float, sight: tuple[Any, ...], new_label: Callable[[], int]) -> list[FloorEvent]:
         """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes."""
@@ -118,13 +138,13 @@ class Tracks:
             self._actions,
             bool(self._region.polygons),
         )
-        events: list[FloorEvent] = []
+        events: list[FloorEvent] = self._unite(t)
         for index in np.flatnonzero(self._actions).tolist():
             body, action = self.bodies[index], self._actions[index]
             if action == _GONE:
-                events += self._gone(body, t)
+                events += self._gone(index, t)
             elif action == _LOST:
-                events += self._lost(body, t)
+                events += self._lost(index, t)
             elif action == _BACK:
                 body["stale"] = 0
                 events.append(Back(t, int(body["label"]), _xy(body)))
@@ -154,19 +174,41 @@ class Tracks:
             if body["used"] and body["confirmed"]
         ]
 
-    def _gone(self, body: Any, t: float) -> list[FloorEvent]:
+    def _gone(self, index: int, t: float) -> list[FloorEvent]:
+        body = self.bodies[index]
         if self._seated(body) and t - body["seen"] < 86400.0:
             body["clear"] = 0.0
-            return self._lost(body, t)
-        body["used"] = 0
+            return self._lost(index, t)
+        self._association.forget(index)
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
 
-    def _lost(self, body: Any, t: float) -> list[FloorEvent]:
+    def _unite(self, t: float) -> list[FloorEvent]:
+        """Two movers who stand on one foot each at one place are one: the younger label goes."""
+        bodies = self.bodies
+        lone = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["lone"] > 1.0))
+        events: list[FloorEvent] = []
+        for index in lone.tolist():
+            for other in lone.tolist():
+                one, two = bodies[other], bodies[index]
+                near = math.hypot(one["x"] - two["x"], one["y"] - two["y"]) < _UNITE_M
+                if near and one["used"] and two["used"] and one["label"] < two["label"]:
+                    self._association.decide()
+                    self._association.forget(index)
+                    events.append(Vanished(t, int(two["label"]), float(two["seen"]), t))
+        return events
+
+    def _lost(self, index: int, t: float) -> list[FloorEvent]:
+        body = self.bodies[index]
         if body["stale"]:
             return []
         if self._outside(body):
-            body["used"] = 0
+            self._association.forget(index)
             return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
+        if body["lone"] > _LONE_S:
+            self._association.decide()
+            body["a_print"] = body["b_print"] = -1
+            body["a_seen"] = body["b_seen"] = -1e9
+            body["lone"] = 0.0
         body["stale"] = 1
         body["vx"] = body["vy"] = 0.0
         return [Stale(t, int(body["label"]))]
@@ -182,6 +224,7 @@ class Tracks:
 
     def _confirm(self, index: int, t: float, new_label: Callable[[], int]) -> list[FloorEvent]:
         body = self.bodies[index]
+        self._association.decide()
         robot = self._is_robot(body)
         old = self._missing(body)
         if old is not None:
@@ -207,15 +250,19 @@ class Tracks:
         return bool(body["wide"] > 0.5)
 
     def _missing(self, body: Any) -> Any:
-        """The mover not seen now that this one most probably is: hidden, seated, or just lost."""
+        """The mover not seen now that this one most probably is: hidden, seated, or only thought to be seen."""
         best, best_gap = None, 1.0
         for other in self.bodies:
             if not (other["used"] and other["confirmed"]):
                 continue
-            if other["seen"] > body["first"] + 0.2 and not _stuck(other, float(body["seen"])):
-                continue
-            since = max(0.0, float(body["first"] - other["seen"]))
-            gap = math.hypot(body["x0"] - other["x"], body["y0"] - other["y"])
+            x, y, seen = float(other["x"]), float(other["y"]), float(other["seen"])
+            if seen > body["first"] + 0.2:
+                lost = _stuck(other, float(body["seen"]))
+                if lost is None:
+                    continue
+                x, y, seen = lost
+            since = max(0.0, float(body["first"]) - seen)
+            gap = math.hypot(body["x0"] - x, body["y0"] - y)
             reach = _OUT_M + min(_SPEED * since, 1.2)
             if self._seated(other):
                 gap = min(gap, self._seats.distance(body["x0"], body["y0"]) + 0.05)
@@ -225,12 +272,18 @@ class Tracks:
         return best
 
 
-def _stuck(body: Any, t: float) -> bool:
-    """Whether all that is seen of a person is one thing that has not moved for long: it may be what was put down."""
+def _stuck(body: Any, t: float) -> tuple[float, float, float] | None:
+    """Where and when (x, y, t) the other foot was last seen, if all that is seen of a person is one thing that stands.
+
+    It may be what was put down, and the person has gone on.
+    """
     a, b = t - body["a_seen"] < 0.5, t - body["b_seen"] < 0.5
-    if body["robot"] or a == b:
-        return False
-    return bool(t - (body["a_since"] if a else body["b_since"]) > 1.0)
+    if body["robot"] or a == b or body["stale"]:
+        return None
+    if t - (body["a_since"] if a else body["b_since"]) < 0.8:
+        return None
+    foot = "b" if a else "a"
+    return float(body[f"{foot}x"]), float(body[f"{foot}y"]), float(body[f"{foot}_seen"])
 
 
 def _told(body: Any, t: float) -> None:
