@@ -127,6 +127,8 @@ def test_pace_resolution_and_field_of_view():
         converse(host, device, clock, 2.0)
     with pytest.raises(ValueError, match="together with a resolution"):
         ColaSession(frequency_hz=25)
+    with pytest.raises(ValueError, match="together with a pace or field of view"):
+        ColaSession(resolution_deg=0.5)
 
 
 @pytest.mark.parametrize("dialect", ["A", "B"])

@@ -51,6 +51,7 @@ def test_replies_are_those_of_the_manual(raw):
 def test_telegrams_and_marks_come_back_however_they_are_cut(items, step):
     raw = b"".join(i.encode() if isinstance(i, Frame) else (ACK if i.heard else NAK) for i in items)
     parser = FrameParser()
+    parser.resume()
     found = [item for at in range(0, len(raw), step) for item in parser.feed(raw[at : at + step])]
     assert found == items and parser.pending == parser.skipped == 0
 
@@ -73,6 +74,15 @@ def test_garbage_before_a_telegram_hides_it_at_most_until_the_line_is_idle(garba
     # a false beginning that happens to have a right sum may swallow it; two bytes of sum make that rare
     assert frame in found or any(isinstance(item, Frame) for item in found)
     assert parser.pending == 0
+
+
+def test_marks_count_only_where_they_can_be_told_from_the_rest_of_a_telegram():
+    parser, frame = FrameParser(), Frame(b"\xa0\x00\x10", 0x80)
+    assert parser.feed(NAK + ACK + NAK) == []
+    assert parser.feed(ACK + frame.encode() + NAK) == [frame, Mark(False)]
+    assert parser.feed(b"\x33" + NAK) == []
+    parser.resume()
+    assert parser.feed(NAK + ACK) == [Mark(False), Mark(True)]
 
 
 @given(st.lists(st.binary(max_size=3000), max_size=5))

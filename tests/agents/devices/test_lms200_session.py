@@ -151,11 +151,13 @@ def test_echoes_errors_and_pollution():
 
 def test_not_heard_is_said_again_and_refusals_say_why():
     clock, device, host = pair()
+    converse(host, device, clock, 0.02)
     device.nak_next = 2
     assert converse(host, device, clock, 2.0)
     clock, device, host = pair()
+    converse(host, device, clock, 0.02)
     device.nak_next = 3
-    with pytest.raises(DeviceFault, match="did not hear when told to stop"):
+    with pytest.raises(DeviceFault, match="did not hear when told to tell its type"):
         converse(host, device, clock, 2.0)
     for code, why in [
         (m.VARIANT, "refuses the angle and resolution"),
@@ -169,6 +171,19 @@ def test_not_heard_is_said_again_and_refusals_say_why():
     clock, device, host = pair(fast=True)
     with pytest.raises(DeviceFault, match=r"does not know how to scan 180 degrees in steps of 0\.5"):
         converse(host, device, clock, 3.0)
+
+
+def test_the_end_of_a_scan_that_was_under_way_is_no_complaint():
+    """The host comes while the device streams values that have the byte "not heard" in them."""
+    clock, device, host = pair(lambda: (np.full(361, 5.397), None))  # 1515 hex
+    device.angle_deg, device.resolution_deg, device.mode = 180, 0.5, m.STREAM
+    scan = device.tick()
+    assert scan.count(b"\x15") > 700
+    said = host.output()
+    host.receive(scan[100:])
+    assert host.output() == b""  # nothing is said again
+    host.receive(device.receive(said))
+    assert converse(host, device, clock, 3.0)
 
 
 def test_silence_is_a_fault_in_the_end():
@@ -218,9 +233,9 @@ def test_the_device_says_when_it_was_not_heard():
     assert device.receive(bytes(raw)).endswith(b"\x15")
     assert device.receive(Frame(m.installation(b"wrong!!!")).encode())[0] == 0x06
     assert device.mode == m.ON_REQUEST
-    (mark, reply) = FrameParser().feed(device.receive(Frame(m.installation(b"wrong!!!")).encode()))
-    assert mark.heard and reply.data == b"\x01"
-    (_, reply) = FrameParser().feed(device.receive(Frame(bytes([m.WRITE_CONFIG]) + bytes(34)).encode()))
+    (reply,) = FrameParser().feed(device.receive(Frame(m.installation(b"wrong!!!")).encode()))
+    assert reply.data == b"\x01"
+    (reply,) = FrameParser().feed(device.receive(Frame(bytes([m.WRITE_CONFIG]) + bytes(34)).encode()))
     assert reply.data[:1] == b"\x00" and device.writes == 0  # not in its installation mode
 
 

@@ -20,6 +20,8 @@ _REPLY_S, _METHOD_S, _REPEATS = 1.0, 3.0, 1
 #: So many starts, or damaged scans, in a row without a good scan between them are a fault.
 _MAX_STARTS, _MAX_DAMAGED = 3, 5
 _CLOCK_BITS = 32
+#: Nothing within a telegram pauses so long.
+_IDLE_S = 0.3
 #: How long the mirror may take to come to another pace.
 _NEW_PACE_S = 15.0
 _SCAN_CONFIG_RESULTS = (
@@ -62,6 +64,8 @@ class ColaSession(Outgoing):
         super().__init__()
         if (frequency_hz is not None or field_deg is not None) and resolution_deg is None:
             raise ValueError("a pace or field of view is set together with a resolution")
+        if resolution_deg is not None and frequency_hz is None and field_deg is None:
+            raise ValueError("a resolution is set together with a pace or field of view")
         self.frames = 0
         self.ready = False
         self.tick_s = 0.05
@@ -99,7 +103,7 @@ class ColaSession(Outgoing):
 
     def tick(self) -> None:
         now = self._clock()
-        if self._parser.pending and now - self._heard_at > 0.3:
+        if self._parser.pending and now - self._heard_at > _IDLE_S:
             self._take(self._parser.resume())
         if self._current is not None:
             if now - self._since > _patience_s(self._current):

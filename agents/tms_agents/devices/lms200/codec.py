@@ -66,12 +66,13 @@ class FrameParser(FrameBuffer):
     """Incremental: feed bytes as they come, get whole telegrams with a right check sum, and marks.
 
     ``replies``: telegrams of a device; otherwise those of a host. What is neither is skipped byte by byte and counted
-    in ``skipped``; fewer than ``MAX_FRAME`` bytes are held.
+    in ``skipped``; fewer than ``MAX_FRAME`` bytes are held. Marks are heard behind a telegram or after ``resume`` only:
+    behind other bytes they would be parts of a telegram of which the beginning was missed.
     """
 
     def __init__(self, *, replies: bool = True) -> None:
         super().__init__()
-        self._replies = replies
+        self._replies, self._in_step = replies, False
 
     def feed(self, data: bytes) -> list[Frame | Mark]:
         items: list[Frame | Mark] = []
@@ -87,6 +88,7 @@ class FrameParser(FrameBuffer):
             del self._buffer[0]
             self.skipped += 1
             items += self._cut()
+        self._in_step = True
         return items
 
     def _cut(self) -> list[Frame | Mark]:
@@ -94,7 +96,7 @@ class FrameParser(FrameBuffer):
         items: list[Frame | Mark] = []
         while at < size:
             byte = buffer[at]
-            if byte in (_ACK, _NAK) and self._replies:
+            if byte in (_ACK, _NAK) and self._replies and self._in_step:
                 items.append(Mark(byte == _ACK))
                 at += 1
                 continue
@@ -103,10 +105,10 @@ class FrameParser(FrameBuffer):
                 break
             if end > at and crc(buffer[at : end - 2]) == int.from_bytes(buffer[end - 2 : end], "little"):
                 items.append(Frame(bytes(buffer[at + 4 : end - 2]), buffer[at + 1]))
-                at = end
+                at, self._in_step = end, True
                 continue
             self.skipped += 1
-            at += 1
+            at, self._in_step = at + 1, False
         del buffer[:at]
         return items
 

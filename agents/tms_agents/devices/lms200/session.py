@@ -19,6 +19,8 @@ Output = Literal["stream", "partial", "reflectivity", "request"]
 #: How long the device may take by the manual, with some margin: to answer, to switch its mode, to write its memory.
 _REPLY_S, _SWITCH_S, _WRITE_S = 1.0, 3.5, 8.0
 _REPEATS = 2
+#: Nothing within a telegram pauses so long.
+_IDLE_S = 0.3
 #: So many starts in a row without a scan between them are a fault.
 _MAX_STARTS = 3
 _SCAN_CODES = (m.RANGES, m.RANGES_AND_REFLECTIVITY)
@@ -96,7 +98,7 @@ class Lms200Session(Outgoing):
 
     def tick(self) -> None:
         now = self._clock()
-        if self._parser.pending and now - self._heard_at > 0.3:
+        if now - self._heard_at > _IDLE_S:
             self._take(self._parser.resume())
         if self._current is not None:
             if now - self._since > self._current.patience_s:
