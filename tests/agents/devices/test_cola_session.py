@@ -256,7 +256,7 @@ KINDS = st.sampled_from(["flip", "drop", "insert"])
 damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 3400), KINDS, st.integers(1, 255)), max_size=4)
 
 
-@settings(deadline=None, max_examples=12)
+@settings(deadline=None, max_examples=8)
 @given(damage)
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm):
     """In CoLa B, which has a sum; CoLa A has none and relies on TCP."""

@@ -239,11 +239,22 @@ def test_the_device_says_when_it_was_not_heard():
     assert reply.data[:1] == b"\x00" and device.writes == 0  # not in its installation mode
 
 
+@pytest.mark.realdata
+def test_a_recorded_scan_of_a_device_that_was_set_up(shared_data):
+    clock, device, host = pair()
+    converse(host, device, clock, 1.0)
+    raw = (shared_data / "devices" / "sick_lms200" / "usick_b0_361pts.bin").read_bytes()
+    (scan,) = host.receive(raw[:300]) + host.receive(raw[300:])
+    assert scan.ranges[:4] == pytest.approx([2.251, 2.251, 2.242, 2.242]) and len(scan.ranges) == 361
+    assert np.rad2deg(scan.sweep.angles[[0, 180, 360]]) == pytest.approx([-90, 0, 90])
+    assert host.condition == "" and scan.intensities is None
+
+
 KINDS = st.sampled_from(["flip", "drop", "insert"])
 damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 800), KINDS, st.integers(1, 255)), max_size=4)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=12)
 @given(damage, st.sampled_from(["stream", "request"]))
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm, output):
     room = Room(181)
