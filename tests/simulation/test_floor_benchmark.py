@@ -1,0 +1,81 @@
+"""The benchmark of floor sensing: the yardstick does what was published of it, the tables say what was measured."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> Iterator[Any]:
+    sys.path.insert(0, str(BENCHMARKS))
+    try:
+        import floor
+
+        yield floor
+    finally:
+        sys.path.remove(str(BENCHMARKS))
+
+
+def laboratory(benchmark: Any, things: list[tuple[float, float, float]], seconds: float, wall_m: float = 4.0) -> Any:
+    """The yardstick before a round wall; ``things`` (x, y, radius) appear after six seconds."""
+    from floor_laboratory import LaboratoryFloor
+
+    angles = np.radians(np.arange(-135, 135.1, 0.25))
+    floor = LaboratoryFloor(angles, (0.0, 0.0, 0.0))
+    rng = np.random.default_rng(0)
+    for k in range(round(10 * (6 + seconds))):
+        ranges = np.full(len(angles), wall_m)
+        for x, y, radius in things if k >= 60 else []:
+            bearing, distance = np.arctan2(y, x), np.hypot(x, y)
+            ranges[np.abs(angles - bearing) < np.arcsin(radius / distance)] = distance - radius
+        floor.scan(0.1 * k, ranges + rng.normal(0, 0.003, len(angles)))
+    return floor
+
+
+def test_the_laboratory_finds_a_thing_after_five_seconds_but_none_that_is_small_or_before_a_wall(
+    benchmark: Any,
+) -> None:
+    assert not [one for one in laboratory(benchmark, [(2, 0, 0.08)], 4.0).labels() if one["attr"] == "object"]
+    (label,) = laboratory(benchmark, [(2, 0, 0.08)], 7.0).labels()
+    assert label["attr"] == "object" and label["x"] == pytest.approx(1.93, abs=0.03)
+    for hidden in [(3.0, 0.0, 0.015), (3.97, 0.0, 0.05)]:  # 2 beams; its front 8 cm before the wall
+        assert not laboratory(benchmark, [hidden], 9.0).labels()
+
+
+def test_one_world_is_judged_and_shown(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    job = benchmark.Job("one", "legs", 1, "ours", duration=25.0)
+    outcome = benchmark.judged(job)
+    assert outcome.scores.movers.people == 1 and outcome.scores.movers.needed > 80
+    assert outcome.scores.movers.idf1 > 0.5 and outcome.cpu_ms > 0
+    benchmark.look(job)
+    assert "objects: recall nan" in capsys.readouterr().out
+
+
+def test_the_tables_hold_what_is_asked_for(benchmark: Any) -> None:
+    from floor_tables import movers_table, objects_table, requirements_table
+
+    scores = [benchmark.judged(benchmark.Job("things", "prints", 1, "laboratory", duration=40.0)).scores]
+    every = {("unseen", "things", "prints"): scores}
+    lines = requirements_table(every).splitlines()
+    assert lines[2] == "| asked for | unseen, prints |"
+    assert any(line.startswith("| recall >= 0.8 of 3 cm | ") for line in lines)
+    found = objects_table({("things", "prints", "laboratory"): scores}).splitlines()
+    cells = found[2].split(" | ")
+    assert len(cells) == len(found[0].split(" | ")) and cells[0] == "| things"
+    assert len(movers_table({("things", "prints", "laboratory"): scores}).splitlines()) == 3
+
+
+@pytest.mark.parametrize("wrong", [["--look", "nothing"], ["--contestants", "ours,theirs"]])
+def test_a_wrong_word_is_one_clear_line(benchmark: Any, capsys: pytest.CaptureFixture[str], wrong: list[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        benchmark.main(wrong)
+    assert stopped.value.code == 2
+    assert f"{wrong[1].split(',')[-1]}" in capsys.readouterr().err.splitlines()[-1]
