@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -50,12 +49,11 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """``late_events`` were told after half a minute; ``cpu_ms`` of one scan with its labels."""
+    """``late_events`` and ``late_labels`` were told after half a minute."""
 
     scores: Scores
     late_events: int
     late_labels: int
-    cpu_ms: float
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -133,31 +131,25 @@ def judged(job: Job) -> Outcome:
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
     contestant = CONTESTANTS[job.contestant](sensors, world.known(), "auto")
     scans = ((f.sensor, f.t, f.ranges, f.intensities) for f in world.scans())
-    prediction, late_events, cpu_s = told(contestant, scans)
+    prediction, late_events = told(contestant, scans)
     late = {one["id"] for frame in prediction if frame["t"] > 30 for one in frame["labels"]}
-    cpu_ms = 1e3 * cpu_s / len(prediction)
-    return Outcome(score(world.truth(), prediction), late_events, len(late), cpu_ms)
+    return Outcome(score(world.truth(), prediction), late_events, len(late))
 
 
-def told(
-    contestant: Contestant, scans: Iterable[tuple[str, float, Any, Any]]
-) -> tuple[list[dict[str, Any]], int, float]:
-    """(prediction, events after 30 s, CPU seconds)."""
-    prediction, late, cpu_s = [], 0, 0.0
+def told(contestant: Contestant, scans: Iterable[tuple[str, float, Any, Any]]) -> tuple[list[dict[str, Any]], int]:
+    """(prediction, events after 30 s)."""
+    prediction, late = [], 0
     for sensor, t, ranges, intensities in scans:
-        begin = time.process_time()
         events = contestant.scan(sensor, t, ranges, intensities)
-        labels = contestant.labels()
-        cpu_s += time.process_time() - begin
         late += events if t > 30 else 0
-        prediction.append({"t": t, "labels": labels})
-    return prediction, late, cpu_s
+        prediction.append({"t": t, "labels": contestant.labels()})
+    return prediction, late
 
 
 def look(job: Job) -> None:
     """One world: all scores, every thing that was missed, every object that was none."""
     outcome = judged(job)
-    print(f"{job}\n{outcome.scores.movers}\n{outcome.scores.objects.summary()}\n{outcome.cpu_ms:.2f} ms CPU a scan")
+    print(f"{job}\n{outcome.scores.movers}\n{outcome.scores.objects.summary()}")
     for span in outcome.scores.objects.spans:
         print(span)
     for false in outcome.scores.objects.false:

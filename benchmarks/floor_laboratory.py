@@ -43,8 +43,9 @@ class LaboratoryFloor:
     """One laser: ``angles`` (n,) at ``pose`` in the room."""
 
     def __init__(self, angles: Floats, pose: Pose) -> None:
-        self._bearings = np.asarray(angles) + pose[2]
-        self._rays = np.stack([np.cos(self._bearings), np.sin(self._bearings)], axis=1)
+        bearings = np.asarray(angles) + pose[2]
+        self._rays = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        self._first, self._heading = float(angles[0]), pose[2]
         self._step = float(angles[1] - angles[0])
         self._at = np.array(pose[:2])
         self._background = np.zeros(len(angles))
@@ -63,9 +64,9 @@ class LaboratoryFloor:
         points = self._segmented(ranges)
         fresh = []
         for xy in points:
-            near = [one for one in self._clusters if np.linalg.norm(one.xy - xy) < SAME_M and one.seen < t]
+            near = [one for one in self._clusters if math.dist(one.xy, xy) < SAME_M and one.seen < t]
             if near:
-                one = min(near, key=lambda one: float(np.linalg.norm(one.xy - xy)))
+                one = min(near, key=lambda one: math.dist(one.xy, xy))
                 one.xy, one.seen = 0.8 * one.xy + 0.2 * xy, t
             else:
                 self._number += 1
@@ -109,20 +110,17 @@ class LaboratoryFloor:
 
     def _hidden(self, xy: Floats, ranges: Floats) -> bool:
         """Something stands in the line of sight."""
-        gap = xy - self._at
-        off = np.abs(np.angle(np.exp(1j * (self._bearings - math.atan2(gap[1], gap[0])))))
-        seen = ranges[int(np.argmin(off))]
-        return bool(0 < seen < np.linalg.norm(gap) - HIDDEN_M)
+        x, y = xy - self._at
+        beam = round((math.remainder(math.atan2(y, x) - self._heading, 2 * math.pi) - self._first) / self._step)
+        return 0 <= beam < len(ranges) and bool(0 < ranges[beam] < math.hypot(x, y) - HIDDEN_M)
 
     def _step_of(self, one: Cluster, t: float) -> None:
         """Whose footprint it is: of who stood last within a step, else of somebody new."""
         near = [
-            (number, prints)
-            for number, prints in self._people.items()
-            if np.linalg.norm(prints[-1][1] - one.xy) < STEP_M
+            (number, prints) for number, prints in self._people.items() if math.dist(prints[-1][1], one.xy) < STEP_M
         ]
         if near:
-            one.person = min(near, key=lambda item: float(np.linalg.norm(item[1][-1][1] - one.xy)))[0]
+            one.person = min(near, key=lambda item: math.dist(item[1][-1][1], one.xy))[0]
         else:
             self._number += 1
             one.person = self._number

@@ -54,7 +54,7 @@ def test_one_world_is_judged_and_shown(benchmark: Any, capsys: pytest.CaptureFix
     job = benchmark.Job("one", "legs", 1, "ours", duration=25.0)
     outcome = benchmark.judged(job)
     assert outcome.scores.movers.people == 1 and outcome.scores.movers.needed > 80
-    assert outcome.scores.movers.idf1 > 0.5 and outcome.cpu_ms > 0
+    assert outcome.scores.movers.idf1 > 0.5
     benchmark.look(job)
     assert "objects: recall nan" in capsys.readouterr().out
 
