@@ -253,13 +253,14 @@ def test_a_method_may_say_that_it_has_begun_and_take_its_time():
 
 
 KINDS = st.sampled_from(["flip", "drop", "insert"])
-damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 3400), KINDS, st.integers(1, 255)), max_size=4)
+HARM = st.tuples(st.integers(0, 25), st.integers(0, 3400), KINDS, st.integers(1, 255))
+damage = st.lists(HARM, max_size=4, unique_by=lambda harm: harm[0])
 
 
 @settings(deadline=None, max_examples=8)
 @given(damage)
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm):
-    """In CoLa B, which has a sum; CoLa A has none and relies on TCP."""
+    """One error in a telegram of CoLa B: two like ones cancel out in its sum. CoLa A has none and relies on TCP."""
     clock, device, host = pair(dialect="B")
     line = DisturbedLine(harm)
     for _ in range(5):
