@@ -71,6 +71,8 @@ class Balance:
         step = self.compare(now, now, now, level, variance)
         if not self.off(step):
             self._off_since, self.right_at = None, now
+            if self.shaking:
+                return None  # a level that swings tells nothing of the zeros
             gain = self.variance / (self.variance + variance + _FLOOR_G**2)
             self.zero = self.zero + gain * step.change
             self.variance = (1 - gain) * self.variance

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
+from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished
 from tms_agents.cabinet.fusion import Doubt, Explanation
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.placing import Placed, Way, place, refine
@@ -104,8 +104,7 @@ class Bookkeeper:
         if not partners:
             return []
         if explanation.kind != "take":
-            self._shelf.join([*partners, *self.newest], gone)
-            return []
+            return [self._shelf.join(step.now, [*partners, *self.newest], gone)]
         self._shelf.tell_apart(partners, gone, step.change + load, step.variance)
         return self._tell(partners[0], step.now, always=True) if len(partners) == 1 else []
 
@@ -137,10 +136,9 @@ class Bookkeeper:
             thing.told = at.xy
             events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
             self.newest.append(thing)
-        ids = tuple(thing.id for thing in self.newest)
-        self._shelf.join(self.newest)
+        together = self._shelf.join(step.now, self.newest)
         if explanation.kind == "joint":
-            events.append(LoadChanged(step.now, ids, step.weight_g, float(np.sqrt(step.variance.sum()))))
+            events.append(together)
         return events
 
     def _remove(self, thing: Thing, step: Step, *, alone: bool) -> Vanished:

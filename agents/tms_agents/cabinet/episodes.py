@@ -41,6 +41,8 @@ _IN_THE_MIDDLE = math.log(1.5)
 _UNKNOWN, _UNLISTED = math.log(1e-3), math.log(5e-3)
 #: How often a thing is slid rather than lifted and put down.
 _SLID = 0.02
+#: More than that never goes with it (share of its weight, g); log-odds of what cannot be.
+_TOO_MUCH, _TOO_MUCH_G, _HOPELESSLY = 1.2, 20.0, -10.0
 
 
 @dataclass(slots=True, eq=False)
@@ -183,14 +185,16 @@ def _dampened(odds: float) -> float:
 
 
 def _way(episode: Episode, outcome: Outcome, things: Mapping[int, Thing], geometry: Geometry) -> float:
-    loads = [things[i].load for i in sorted(outcome.gone)]
+    gone = [things[i] for i in sorted(outcome.gone)]
+    anywhere = [thing for thing in gone if thing.joint - outcome.gone]
+    loads = [thing.load for thing in gone if thing not in anywhere]
     if outcome.new:
         loads.append(outcome.load)
-    return way_odds(episode.way, loads, geometry, free=len(outcome.new) == 2)
+    return way_odds(episode.way, loads, geometry, free=len(outcome.new) == 2 or bool(anywhere))
 
 
 def _lifted(episode: Episode, outcome: Outcome, things: Mapping[int, Thing]) -> float:
-    """A thing that is somewhere else now was lifted on the way; what was slid never took its weight off the board."""
+    """A thing that is somewhere else now was lifted on the way: its weight was off the board, and no more than that."""
     if len(outcome.gone) != 1 or len(outcome.new) != 1:
         return 0.0
     (old,) = (things[i] for i in outcome.gone)
@@ -199,6 +203,8 @@ def _lifted(episode: Episode, outcome: Outcome, things: Mapping[int, Thing]) -> 
     if old.tag != outcome.new[0] or len(totals) < 3:
         return 0.0
     least = float(np.convolve(totals, np.ones(3) / 3, "valid").min())
+    if least < -_TOO_MUCH * weight - _TOO_MUCH_G:
+        return _HOPELESSLY
     return 0.0 if least < -0.5 * weight else math.log(_SLID)
 
 

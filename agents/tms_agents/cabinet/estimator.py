@@ -34,6 +34,8 @@ _BALANCE_S, _CORRECT_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 4.0, 0.9, 0.8
 _HEARD = 2
 #: Several at once are believed only at a level that is no pause between them.
 _SEVERAL_S = 0.7
+#: What may be a part of several things that are being put must stay so for so long to be believed.
+_PART_S = 3.0
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
 _JUMP_G = 6.0
 #: A block so near the resting level tells how much it wobbles.
@@ -228,10 +230,11 @@ class CabinetEstimator:
         arm = self._may_be_an_arm(step, best)
         patience = self._settings.stubborn_s if arm else self._settings.patience_s
         unsure = arm or self._unclear(step, best) or self._looks_pressed(step, best, waited)
-        if unsure and waited < patience:
+        part = self._may_be_a_part(best, step)
+        if (unsure and waited < patience) or (part and waited < _PART_S):
             self._detector.hold(step)
             return []
-        if final and (arm or (steady < _PASSING_S and (unsure or best.several))):
+        if final and (arm or (part and steady < _PART_S) or (steady < _PASSING_S and (unsure or best.several))):
             self._detector.ignore(step)
             return []
         if best.kind == "slide":
@@ -266,16 +269,23 @@ class CabinetEstimator:
 
     def _looks_pressed(self, step: Step, best: Explanation, waited: float) -> bool:
         """A thing that must be one of some known weights, and is of none of them: a hand still holds it."""
+        return self._fits_none(best, step, self._namer.loose()) and not _PASSING_S < waited < math.inf
+
+    def _may_be_a_part(self, best: Explanation, step: Step) -> bool:
+        """Several tags are new and the weight is of none of their things: one has come, and another is on its way."""
         loose = self._namer.loose()
+        return len(loose) > 1 and self._fits_none(best, step, loose)
+
+    @staticmethod
+    def _fits_none(best: Explanation, step: Step, loose: Mapping[str, KnownWeight | None]) -> bool:
         if best.load is None or best.kind not in ("put", "swap") or None in loose.values() or not loose:
             return False
         weight, sd = float(best.load.sum()), math.sqrt(float(step.variance.sum()))
-        fits = any(
+        return not any(
             abs(weight - known.mean_g) < 4 * math.hypot(sd, known.sd_g) + 2.0
             for known in loose.values()
             if known is not None
         )
-        return not fits and not _PASSING_S < waited < math.inf
 
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         self._detector.accept(step)

@@ -126,8 +126,10 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
         Explanation("unknown", math.log(_PRIOR["unknown"]) + put.anything(change, variance)),
     ]
     if evidence.left is not None:
-        # It makes good what was wrong before, so that everything fits now.
-        settled = math.log(_PRIOR["settled"]) + normal(*evidence.left)
+        # It makes good what was wrong before, so that everything fits now; if nothing was wrong, that is hardly it.
+        before = evidence.left[0] - change
+        right = normal(before, evidence.left[1]) - put.anything(before, evidence.left[1])
+        settled = math.log(_PRIOR["settled"]) + normal(*evidence.left) - max(right, 0.0)
         found.append(Explanation("settled", settled))
     if evidence.shaking:
         swing = math.log(_PRIOR["settled"] * _SWINGS) + normal(change, variance + _SWING_G**2)

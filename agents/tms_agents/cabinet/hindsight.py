@@ -19,9 +19,10 @@ from tms_agents.cabinet.revising import Revision, current, order
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 
-#: An episode is looked at when the board has rested so long; the next one begins after so long a rest, and after so
-#: long a one nothing more is asked about the last.
-_LOOK_S, _RESTED_S, _CLOSED_S = 1.5, 2.5, 4.0
+#: An episode is looked at when the board has rested so long; the next one begins after so long a rest; later the last
+#: one is looked at less often, and after so long a rest no more.
+_LOOK_S, _RESTED_S, _RARELY_S, _CLOSED_S = 1.5, 2.5, 4.0, 20.0
+_AGAIN_S = 2.0
 #: Another outcome must be so sure, and what was told so improbable.
 _SURE, _DOUBT = 0.9, 0.05
 #: More often than that an episode is not put right: something else speaks against it.
@@ -40,6 +41,7 @@ class Hindsight:
         self._before: list[Thing] | None = None
         self._episode: Episode | None = None
         self._uncertain = False
+        self._looked = -math.inf
         self._revisions = 0
 
     def changing(self, block: Block, level: Level) -> None:
@@ -59,7 +61,9 @@ class Hindsight:
     ) -> list[CabinetEvent]:
         """The load rests at ``level``, (k,) g, for some ``seconds``; the last change ended at ``rested``."""
         events: list[CabinetEvent] = []
-        if self._episode is not None and seconds >= _LOOK_S and self._revisions < _MOST_REVISIONS:
+        due = seconds >= _LOOK_S and (seconds < _RARELY_S or t - self._looked >= _AGAIN_S)
+        if self._episode is not None and due and self._revisions < _MOST_REVISIONS:
+            self._looked = t
             events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
         if seconds >= _RESTED_S:
             self._before = [

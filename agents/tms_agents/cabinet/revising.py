@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from tms_agents.cabinet.episodes import Episode, Outcome
-from tms_agents.cabinet.events import Appeared, CabinetEvent, LoadChanged, Moved, Vanished
+from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished
 from tms_agents.cabinet.geometry import Array, KnownWeight
 from tms_agents.cabinet.stays import Shelf, Thing
 
@@ -104,7 +104,7 @@ class Revision:
         events += self._share(stays, wanted)
         new = [*stays, *(thing for i, thing in self._shelf.things.items() if i not in known)]
         if new and (partners := self._shelf.partners(self._outcome.gone)):
-            self._shelf.join([*partners, *new], self._outcome.gone)
+            events.append(self._shelf.join(self._now, [*partners, *new], self._outcome.gone))
         return events + later
 
     def _told_apart(self) -> None:
@@ -160,9 +160,7 @@ class Revision:
         for tag, (share, guess) in zip(wanted, guesses[len(stays) :], strict=True):
             events += self._put(share, guess, tag, self._episode.onset)
             together.append(self._shelf.things[self._shelf.next_id - 1])
-        self._shelf.join(together)
-        ids, sd = tuple(thing.id for thing in together), float(np.sqrt(self._outcome.variance.sum()))
-        return [*events, LoadChanged(self._now, ids, float(load.sum()), sd)]
+        return [*events, self._shelf.join(self._now, together)]
 
     def _put(self, load: Array, variance: Array, tag: str | None, since: float) -> list[CabinetEvent]:
         thing = self._shelf.put(load.copy(), variance.copy(), since=since, onset=since)

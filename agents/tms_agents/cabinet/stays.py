@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tms_agents.cabinet.events import Stay
+from tms_agents.cabinet.events import LoadChanged, Stay
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.position import Centre, centre
 
@@ -109,11 +109,14 @@ class Shelf:
                 thing.variance, thing.joint = 2 * variance, frozenset()
             thing.forget_place()
 
-    def join(self, things: Sequence[Thing], gone: Collection[int] = ()) -> None:
-        """Of these only the sum is known from now on; those ``gone`` belonged to some of them."""
+    def join(self, now: float, things: Sequence[Thing], gone: Collection[int] = ()) -> LoadChanged:
+        """Of these only the sum is known from ``now`` on; those ``gone`` belonged to some of them."""
         for thing in things:
             others = {other.id for other in things if other is not thing}
             thing.joint = (thing.joint | others) - set(gone)
+        errors, _ = errors_of(things, now, 0.0, self.geometry.count)
+        weight_g = sum(float(thing.load.sum()) for thing in things)
+        return LoadChanged(now, tuple(thing.id for thing in things), weight_g, math.sqrt(float(errors.sum())))
 
     def tagged(self, tag: str) -> Thing | None:
         return next((thing for thing in self.things.values() if thing.tag == tag), None)
