@@ -37,6 +37,17 @@ def _crowded(c: Any, bodies: Any) -> bool:
 
 
 @njit(cache=True)
+def _attended(c: Any, bodies: Any, t: float) -> bool:
+    """Whether a person stands beside the cluster."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
+        if person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width:
+            return True
+    return False
+
+
+@njit(cache=True)
 def _rows(bodies: Any, confirmed: int, rows: NDArray[np.int64]) -> int:
     count = 0
     for b in range(bodies.size):
@@ -111,6 +122,9 @@ def _complete(
         for b in range(bodies.size):
             if not bodies[b].used:
                 begin(bodies[b], c, of[i], t)
+                # What is wide and begins beside somebody is pushed.
+                if c.width > 0.28 and _attended(c, bodies, t):
+                    bodies[b].from_furniture = 1
                 break
 
 

@@ -129,12 +129,16 @@ def costs(
         cost[i, :] = UNLIKELY
         q = prints[of[i]] if of[i] >= 0 else prints[0]
         age = t - q.first if of[i] >= 0 else 0.0
-        cost[i, 2 * k + i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
+        cost[i, 2 * k + i] = (
+            _CLUTTER if narrow(c) or c.attached or c.width > 0.45 else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
+        )
         if not free[i]:
             continue
         for column in range(k):
             body = bodies[rows[column]]
             away = np.hypot(c.x - body.x, c.y - body.y)
+            if body.stale and age > _FRESH_S:
+                continue
             if not body.confirmed and age > t - body.first + 0.25:
                 continue
             if away > _REACH_M + 1.5 * np.sqrt(body.pp):
@@ -147,7 +151,7 @@ def costs(
             base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
             shape = 0.0
             if c.width > WIDE_M:
-                shape = 3.0
+                shape = 3.0 if c.width < 0.45 else 8.0
             elif narrow(c):
                 shape = 2.0 if c.n == 1 else 6.0
             if c.attached:
@@ -231,11 +235,12 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.ax, body.ay, body.a_seen, body.a_since, body.a_print = c.x, c.y, t, t, print_index
     body.bx, body.by, body.b_seen, body.b_since, body.b_print = c.x, c.y, -1e9, t, -1
     body.told_at = -1e9
-    body.from_furniture = 0
+    # What is wide and begins right before the background is a piece of it that is moved.
+    body.from_furniture = 1 if c.width > 0.28 and c.gap < 0.35 else 0
     body.clear = 0.0
     body.score = footlike(c)
     body.a_vx, body.a_vy, body.b_vx, body.b_vy = 0.0, 0.0, 0.0, 0.0
-    body.stride, body.side, body.lone = 0.6, 0.0, 0.0
+    body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
 
 
 @njit(cache=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.association import Association
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, look
-from tms_agents.floor.furniture import Furniture
+from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.masks import Masks
 from tms_agents.floor.objects import Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
@@ -97,13 +97,19 @@ class FloorEstimator:
             view.claimed,
             self._looks,
         )
-        clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.rays))
+        clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
         somebodys = self._association.step(clusters, of, prints, t, view.sight)
         attend(prints, bodies, t)
         vanished = objects.weigh(self._looks, bodies, t, dt)
-        movers = self._tracks.review(t, dt, view.sight, self._new_label)
+        movers = self._tracks.review(
+            t,
+            dt,
+            view.sight,
+            self._new_label,
+            lambda body: self._furniture.was(body, self._pieces(t)),
+        )
         appeared: list[FloorEvent] = []
         if view.background.learned:
             for index, is_object in objects.ripe(prints, bodies, t):
@@ -111,13 +117,15 @@ class FloorEstimator:
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared
 
+    def _pieces(self, t: float) -> list[Piece]:
+        return [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]
+
     def _settle(self, index: int, t: float, *, is_object: bool) -> list[FloorEvent]:
         """A print rests: it is an object or furniture."""
         q = self._prints[index]
         started = min(view.background.seconds for view in self._views.values())
-        pieces = [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]
         known = t - q["first"] > started - self._settings.learn_s
-        if not is_object or known or self._furniture.explains(q, pieces, t):
+        if not is_object or known or self._furniture.explains(q, self._pieces(t), t):
             q["revealed"] = 2
             return []
         who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})

@@ -97,6 +97,17 @@ class Furniture:
         return True
 
     @staticmethod
+    def was(body: Any, pieces: list[Piece]) -> bool:
+        """Whether the body began where a piece of background about as wide has gone at that time."""
+        width = float(body["far"])
+        return any(
+            math.hypot(piece.x - body["x0"], piece.y - body["y0"]) < _PUSHED_M
+            and 0.5 * width < piece.width < 1.5 * width
+            and abs(piece.t - body["first"]) < _GROUP_S
+            for piece in pieces
+        )
+
+    @staticmethod
     def _grouped(piece: Piece, pieces: list[Piece]) -> bool:
         return any(
             other is not piece

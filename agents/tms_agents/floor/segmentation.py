@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 #: A cluster in the room frame: (x, y) m of the middle of the thing, (width m) across the beams, (n) beams, (near) its
 #: range, (first, last) beam, (cut) partly hidden behind something nearer, (attached) its surface goes on as background:
-#: a piece of furniture or wall, (mirror) seen in a mirror (-1: directly).
+#: a piece of furniture or wall, (gap) m to the background behind it, (mirror) seen in a mirror (-1: directly).
 CLUSTER = np.dtype(
     [
         ("x", "f8"),
@@ -27,6 +27,7 @@ CLUSTER = np.dtype(
         ("last", "i8"),
         ("cut", "i8"),
         ("attached", "i8"),
+        ("gap", "f8"),
         ("mirror", "i8"),
     ]
 )
@@ -65,6 +66,7 @@ def _segment(
     ranges: Array,
     states: NDArray[np.int8],
     claimed: NDArray[np.bool_],
+    longest: Array,
     rays: Array,
     step: Array,
     grazing: float,
@@ -142,6 +144,7 @@ def _segment(
             if 0 <= side < n and ranges[side] < c.near - 0.1 and not np.isnan(ranges[side]):
                 c.cut = 1
         middle = (a + b) // 2
+        c.gap = longest[middle] - ranges[middle]
         shift = _DEPTH * min(c.width, 0.5)
         c.x += shift * rays[middle, o + 2]
         c.y += shift * rays[middle, o + 3]
@@ -155,7 +158,9 @@ class Segmenter:
         self._step, self._grazing = step, grazing_rad
         self._clusters = np.zeros(most, CLUSTER)
 
-    def __call__(self, ranges: Array, states: NDArray[np.int8], claimed: NDArray[np.bool_], rays: Array) -> Any:
-        """The clusters of one scan (m,) of ``CLUSTER``: ranges, states, claimed (n,), rays (n, 10)."""
-        count = _segment(ranges, states, claimed, rays, self._step, self._grazing, self._clusters)
+    def __call__(
+        self, ranges: Array, states: NDArray[np.int8], claimed: NDArray[np.bool_], longest: Array, rays: Array
+    ) -> Any:
+        """The clusters of one scan (m,) of ``CLUSTER``: ranges, states, claimed, longest (n,), rays (n, 10)."""
+        count = _segment(ranges, states, claimed, longest, rays, self._step, self._grazing, self._clusters)
         return self._clusters[:count]

@@ -87,6 +87,7 @@ BODY = np.dtype(
         ("stride", "f8"),
         ("side", "f8"),
         ("lone", "f8"),
+        ("pushed", "f8"),
     ]
 )
 

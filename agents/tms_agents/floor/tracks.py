@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 6.0
+#: What is new for so long (s) may turn out to be furniture.
+_NEW_S = 30.0
+#: What is pushed is left within this (m).
+_PUSHED_M = 2.0
 #: Two of them so near each other (m) are one.
 _UNITE_M = 0.35
 #: A mover is told again when it has moved so far (m).
@@ -40,6 +44,17 @@ def _is_lone(body: Any, t: float) -> bool:
     a, b = t - body.a_seen, t - body.b_seen
     since = body.a_since if a < b else body.b_since
     return bool(max(a, b) > 1.0 and t - since > 1.0)
+
+
+@njit(cache=True)
+def _accompanied(bodies: Any, b: int, t: float) -> bool:
+    """Whether a person is so near something wide that it may be pushed."""
+    for o in range(bodies.size):
+        other = bodies[o]
+        person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < 0.5
+        if person and np.hypot(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -68,6 +83,8 @@ def _review(
         if not body.used:
             continue
         unseen = t - body.seen
+        if body.wide > 0.3 and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
+            body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
         if not body.confirmed:
             way = np.hypot(body.x - body.x0, body.y - body.y0)
             age = body.seen - body.first
@@ -82,6 +99,9 @@ def _review(
                     beside = min(beside, np.hypot(bodies[o].x - body.x, bodies[o].y - body.y))
             needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
             needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
+            if body.wide > 0.5:
+                # Furniture that is pushed aside looks like a robot at first.
+                needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
             if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= 3.0:
                 actions[b] = _CONFIRM
             continue
@@ -121,8 +141,18 @@ class Tracks:
         self._robots = [tuple(sorted(size)) for size in scene.robots]
         self._actions = np.zeros(self.bodies.size, np.int64)
 
-    def review(self, t: float, dt: float, sight: tuple[Any, ...], new_label: Callable[[], int]) -> list[FloorEvent]:
-        """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes."""
+    def review(
+        self,
+        t: float,
+        dt: float,
+        sight: tuple[Any, ...],
+        new_label: Callable[[], int],
+        was_furniture: Callable[[Any], bool],
+    ) -> list[FloorEvent]:
+        """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes.
+
+        ``was_furniture`` tells of a body whether a piece of background has gone from where it began.
+        """
         s = self._settings
         review: Any = _review
         review(
@@ -150,7 +180,12 @@ class Tracks:
                 events.append(Back(t, int(body["label"]), _xy(body)))
                 _told(body, t)
             elif action == _CONFIRM:
-                events += self._confirm(index, t, new_label)
+                events += self._confirm(index, t, new_label, was_furniture)
+            elif body["wide"] > 0.5 and t - body["first"] < _NEW_S and (body["pushed"] > 0.8 or was_furniture(body)):
+                # Furniture that is pushed is seen to be missing only when the one who pushes has left its place.
+                self._association.decide()
+                body["confirmed"], body["from_furniture"], body["robot"] = 0, 1, 0
+                events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             else:
                 events.append(Moved(t, int(body["label"]), _xy(body), _cov(body)))
                 _told(body, t)
@@ -222,8 +257,23 @@ class Tracks:
             return self._gates.distance(x, y) < 0.3
         return bool(self._region.polygons) and self._region.distance(x, y) > 0.0
 
-    def _confirm(self, index: int, t: float, new_label: Callable[[], int]) -> list[FloorEvent]:
+    def _confirm(
+        self,
+        index: int,
+        t: float,
+        new_label: Callable[[], int],
+        was_furniture: Callable[[Any], bool],
+    ) -> list[FloorEvent]:
         body = self.bodies[index]
+        if body["from_furniture"] and body["wide"] > 0.3:
+            # Nothing is pushed so far; it goes by itself.
+            way = math.hypot(body["x"] - body["x0"], body["y"] - body["y0"])
+            if way < _PUSHED_M or body["pushed"] > 0.3:
+                return []
+            body["from_furniture"] = 0
+        elif body["wide"] > 0.3 and (body["pushed"] > 0.6 or was_furniture(body)):
+            body["from_furniture"] = 1
+            return []
         self._association.decide()
         robot = self._is_robot(body)
         old = self._missing(body)
@@ -234,8 +284,6 @@ class Tracks:
             body["robot"] = old["robot"]
             _told(body, t)
             return [Back(t, label, _xy(body))] if stale else [Moved(t, label, _xy(body), _cov(body))]
-        if body["from_furniture"]:
-            return []
         body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
         _told(body, t)
         width = float(body["width"])
