@@ -22,6 +22,9 @@ _FRESH_S = 1.0
 _FOOT_M = 0.05
 #: Wider than two feet side by side (m): a robot or furniture.
 WIDE_M = 0.33
+_BROAD_M = 0.45
+#: What has been narrow for so many scans is no robot.
+_PERSON_HITS = 100
 UNLIKELY = 1e6
 #: A cluster that is nobody's foot: negative log likelihood of somebody new, and how much less of a thing put down.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE = 11.0, 6.0, 4.0, 5.0
@@ -129,9 +132,7 @@ def costs(
         cost[i, :] = UNLIKELY
         q = prints[of[i]] if of[i] >= 0 else prints[0]
         age = t - q.first if of[i] >= 0 else 0.0
-        cost[i, 2 * k + i] = (
-            _CLUTTER if narrow(c) or c.attached or c.width > 0.45 else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
-        )
+        cost[i, 2 * k + i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
         if not free[i]:
             continue
         for column in range(k):
@@ -151,7 +152,9 @@ def costs(
             base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
             shape = 0.0
             if c.width > WIDE_M:
-                shape = 3.0 if c.width < 0.45 else 8.0
+                shape = 3.0
+                if c.width > _BROAD_M and body.hits > 15:
+                    shape += 5.0 * max(0.0, 1.0 - 3.0 * body.wide)
             elif narrow(c):
                 shape = 2.0 if c.n == 1 else 6.0
             if c.attached:
@@ -241,6 +244,12 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.score = footlike(c)
     body.a_vx, body.a_vy, body.b_vx, body.b_vy = 0.0, 0.0, 0.0, 0.0
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
+
+
+@njit(cache=True)
+def misled(body: Any) -> bool:
+    """Whether what is taken for a person has become as wide as furniture."""
+    return bool(not body.robot and body.wide > 0.5 and body.hits > _PERSON_HITS)
 
 
 @njit(cache=True)
@@ -338,7 +347,7 @@ def update(
     width = max(c.width if has_c else 0.0, d.width if has_d else 0.0)
     body.wide += 0.05 * ((1.0 if width > WIDE_M else 0.0) - body.wide)
     if body.hits > 30:
-        if body.wide > 0.6:
+        if body.wide > 0.6 and body.hits < _PERSON_HITS:
             body.robot = 1
         elif body.wide < 0.15:
             body.robot = 0

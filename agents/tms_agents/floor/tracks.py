@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.association import Association
+from tms_agents.floor.bodies import misled
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.masks import Area
@@ -107,7 +108,7 @@ def _review(
             continue
         if unseen == 0.0:
             body.lone = body.lone + dt if _is_lone(body, t) else 0.0
-            if body.lone > _LONE_S:
+            if body.lone > _LONE_S or misled(body):
                 # One thing that does not move is no person: whoever it was is somewhere else.
                 actions[b] = _LOST
             elif body.stale:
@@ -239,11 +240,11 @@ class Tracks:
         if self._outside(body):
             self._association.forget(index)
             return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
-        if body["lone"] > _LONE_S:
+        if body["lone"] > _LONE_S or misled(body):
             self._association.decide()
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
-            body["lone"] = 0.0
+            body["lone"] = body["wide"] = 0.0
         body["stale"] = 1
         body["vx"] = body["vy"] = 0.0
         return [Stale(t, int(body["label"]))]
