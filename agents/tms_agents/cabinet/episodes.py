@@ -27,6 +27,8 @@ _FLOOR_G = 1.5
 #: How often a thing was measured badly before, or a zero has moved, by so much at least; how far known weights are
 #: trusted.
 _LOOSE, _BADLY_G, _TRUST = 0.05, 6.0, 0.95
+#: ... and how far it is trusted that nothing weighs more than is known, by a share and some g.
+_TRUST_MORE, _MORE, _MORE_G = 0.998, 0.1, 10.0
 #: The same while something shakes the board.
 _SHAKEN, _SHAKEN_G = 0.4, 9.0
 #: Outcomes so much less probable by tags alone than the best one are not weighed, nor more than so many.
@@ -126,7 +128,12 @@ def _of_new(
 ) -> float:
     """Log density of a load that is that of the ``new`` things."""
     of = _expected(gone, new, known.weight)
-    put = PutDensity(geometry, _LEAST_G * len(new), of, trust=_TRUST if of else 0.5, clear=_CLEAR)
+    trust = 0.5
+    if of:
+        # What was used up weighs less than is known of it; hardly anything weighs more.
+        heavy = float(load.sum()) > max(one.mean_g for one in of) * (1 + _MORE) + _MORE_G
+        trust = _TRUST_MORE if heavy else _TRUST
+    put = PutDensity(geometry, _LEAST_G * len(new), of, trust=trust, clear=_CLEAR)
     return put(load, variance, total) + (_IN_THE_MIDDLE if len(new) == 2 else 0.0)
 
 
