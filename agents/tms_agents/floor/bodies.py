@@ -23,8 +23,8 @@ _FOOT_M = 0.05
 #: Wider than two feet side by side (m): a robot or furniture.
 WIDE_M = 0.33
 _BROAD_M = 0.45
-#: What has been narrow for so many scans is no robot.
-_PERSON_HITS = 100
+#: Of whom two feet were seen at once in this share of so many scans is no robot.
+_TWO_FEET, _PERSON_HITS = 0.2, 80
 UNLIKELY = 1e6
 #: A cluster that is nobody's foot: negative log likelihood of somebody new, and how much less of a thing put down.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE = 11.0, 6.0, 4.0, 5.0
@@ -82,7 +82,7 @@ def _apart(dx: float, dy: float, body: Any, speed: float, along: float, aside: f
         dx, dy = dx * ux + dy * uy, dy * ux - dx * uy
     else:
         along = aside = 0.5 * (along + aside)
-    return 0.5 * (dx * dx / (along * along + body.pp) + dy * dy / (aside * aside + body.pp))
+    return float(0.5 * (dx * dx / (along * along + body.pp) + dy * dy / (aside * aside + body.pp)))
 
 
 @njit(cache=True)
@@ -90,7 +90,7 @@ def _landing(dx: float, dy: float, body: Any, speed: float, side: float) -> floa
     """The same of a foot landing (dx, dy) from the other: a stride ahead and on its own side."""
     ux, uy = body.vx / speed, body.vy / speed
     ahead, aside = dx * ux + dy * uy - body.stride, dy * ux - dx * uy - side
-    return 0.5 * (ahead**2 / (0.15**2 + 0.2 * body.pp) + aside**2 / (0.1**2 + 0.2 * body.pp)) + 2.4
+    return float(0.5 * (ahead**2 / (0.15**2 + 0.2 * body.pp) + aside**2 / (0.1**2 + 0.2 * body.pp)) + 2.4)
 
 
 @njit(cache=True)
@@ -242,6 +242,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.from_furniture = 1 if c.width > 0.28 and c.gap < 0.35 else 0
     body.clear = 0.0
     body.score = footlike(c)
+    body.quality, body.single = 0.7, 0.0
     body.a_vx, body.a_vy, body.b_vx, body.b_vy = 0.0, 0.0, 0.0, 0.0
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
 
@@ -249,7 +250,8 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
 @njit(cache=True)
 def misled(body: Any) -> bool:
     """Whether what is taken for a person has become as wide as furniture."""
-    return bool(not body.robot and body.wide > 0.5 and body.hits > _PERSON_HITS)
+    two_feet = body.both > _TWO_FEET * body.hits
+    return bool(not body.robot and body.wide > 0.5 and body.hits > _PERSON_HITS and two_feet)
 
 
 @njit(cache=True)
@@ -258,8 +260,8 @@ def footlike(c: Any) -> float:
     if narrow(c) or c.attached:
         return -0.2
     if c.n == 1:
-        return 0.2
-    return min(1.0, c.width / 0.08)
+        return 0.2 if c.spacing < 0.025 else 0.5
+    return float(min(1.0, c.width / 0.08))
 
 
 @njit(cache=True)
@@ -312,6 +314,8 @@ def update(
     body.hits += 1
     body.seen = t
     body.clear = 0.0
+    best = max(footlike(c) if has_c else 0.0, footlike(d) if has_d else 0.0)
+    body.quality += 0.05 * (best - body.quality)
     both = has_c and has_d
     if has_c and not has_d and together(body, c, t):
         body.b_seen = t
@@ -346,8 +350,8 @@ def update(
         body.both += 1
     width = max(c.width if has_c else 0.0, d.width if has_d else 0.0)
     body.wide += 0.05 * ((1.0 if width > WIDE_M else 0.0) - body.wide)
-    if body.hits > 30:
-        if body.wide > 0.6 and body.hits < _PERSON_HITS:
+    if body.hits > 20:
+        if body.wide > 0.5 and body.both < _TWO_FEET * body.hits:
             body.robot = 1
         elif body.wide < 0.15:
             body.robot = 0

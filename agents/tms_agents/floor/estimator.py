@@ -109,6 +109,7 @@ class FloorEstimator:
             view.sight,
             self._new_label,
             lambda body: self._furniture.was(body, self._pieces(t)),
+            learned=view.background.learned,
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:

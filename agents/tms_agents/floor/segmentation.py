@@ -97,10 +97,11 @@ def _segment(
             if i - last <= 2:
                 joined = gap < reach
             elif gap < _HIDDEN_M:
-                # A thin leg of a table may stand before the middle of one thing.
+                # A thin leg of a table may stand before the middle of one thing, and a glossy one echoes in parts.
                 joined = True
                 for b in range(last + 1, i):
-                    if not ranges[b] < min(r, before) - 0.05:
+                    silent = np.isnan(ranges[b]) or (np.isinf(ranges[b]) and np.isfinite(longest[b]))
+                    if not silent and not ranges[b] < min(r, before) - 0.05:
                         joined = False
                         break
         if not joined:

@@ -88,6 +88,8 @@ BODY = np.dtype(
         ("side", "f8"),
         ("lone", "f8"),
         ("pushed", "f8"),
+        ("quality", "f8"),
+        ("single", "f8"),
     ]
 )
 

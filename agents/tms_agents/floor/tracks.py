@@ -23,12 +23,14 @@ Array = NDArray[np.float64]
 _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 6.0
+#: How much what is seen of a mover must look like feet (`footlike`) in the long run.
+_QUALITY = 0.3
 #: What is new for so long (s) may turn out to be furniture.
 _NEW_S = 30.0
 #: What is pushed is left within this (m).
 _PUSHED_M = 2.0
 #: Two of them so near each other (m) are one.
-_UNITE_M = 0.35
+_UNITE_M = 0.45
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 #: A seated person's feet vanish so near the seat (m).
@@ -76,6 +78,7 @@ def _review(
     stale_s: float,
     actions: NDArray[np.int64],
     inside: bool,
+    learned: bool,
 ) -> None:
     """What is due for each body, into ``actions``; drops tentative ones that came to nothing."""
     for b in range(bodies.size):
@@ -94,12 +97,20 @@ def _review(
                 continue
             if unseen > 0.0:
                 continue
-            beside = np.inf
+            beside, halved = np.inf, False
             for o in range(bodies.size):
                 if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
-                    beside = min(beside, np.hypot(bodies[o].x - body.x, bodies[o].y - body.y))
+                    away = np.hypot(bodies[o].x - body.x, bodies[o].y - body.y)
+                    beside = min(beside, away)
+                    # One foot of somebody there is not seen now: this may be it.
+                    if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
+                        halved = True
             needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
             needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
+            if halved:
+                needed_s = 8.0 * confirm_s
+            if not learned:
+                needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
             if body.wide > 0.5:
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
@@ -108,9 +119,13 @@ def _review(
             continue
         if unseen == 0.0:
             body.lone = body.lone + dt if _is_lone(body, t) else 0.0
+            single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
+            body.single = body.single + dt if single else 0.0
             if body.lone > _LONE_S or misled(body):
                 # One thing that does not move is no person: whoever it was is somewhere else.
                 actions[b] = _LOST
+            elif body.quality < _QUALITY:
+                actions[b] = _GONE
             elif body.stale:
                 actions[b] = _BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
@@ -149,6 +164,8 @@ class Tracks:
         sight: tuple[Any, ...],
         new_label: Callable[[], int],
         was_furniture: Callable[[Any], bool],
+        *,
+        learned: bool,
     ) -> list[FloorEvent]:
         """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes.
 
@@ -168,6 +185,7 @@ class Tracks:
             s.stale_s,
             self._actions,
             bool(self._region.polygons),
+            learned,
         )
         events: list[FloorEvent] = self._unite(t)
         for index in np.flatnonzero(self._actions).tolist():
@@ -219,9 +237,9 @@ class Tracks:
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
 
     def _unite(self, t: float) -> list[FloorEvent]:
-        """Two movers who stand on one foot each at one place are one: the younger label goes."""
+        """Two movers with one foot each at one place are one: the younger label goes."""
         bodies = self.bodies
-        lone = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["lone"] > 1.0))
+        lone = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["single"] > 0.5))
         events: list[FloorEvent] = []
         for index in lone.tolist():
             for other in lone.tolist():
