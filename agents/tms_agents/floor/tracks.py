@@ -200,7 +200,12 @@ class Tracks:
                 _told(body, t)
             elif action == _CONFIRM:
                 events += self._confirm(index, t, new_label, was_furniture)
-            elif body["wide"] > 0.5 and t - body["first"] < _NEW_S and (body["pushed"] > 0.8 or was_furniture(body)):
+            elif (
+                body["wide"] > 0.5
+                and t - body["first"] < _NEW_S
+                and body["from_furniture"] == 0
+                and (body["pushed"] > 0.8 or was_furniture(body))
+            ):
                 # Furniture that is pushed is seen to be missing only when the one who pushes has left its place.
                 self._association.decide()
                 body["confirmed"], body["from_furniture"], body["robot"] = 0, 1, 0
@@ -284,12 +289,12 @@ class Tracks:
         was_furniture: Callable[[Any], bool],
     ) -> list[FloorEvent]:
         body = self.bodies[index]
-        if body["from_furniture"] and body["wide"] > 0.3:
+        if body["from_furniture"] == 1 and body["wide"] > 0.3:
             # Nothing is pushed so far; it goes by itself.
             way = math.hypot(body["x"] - body["x0"], body["y"] - body["y0"])
-            if way < _PUSHED_M or body["pushed"] > 0.3:
+            if way < _PUSHED_M or body["pushed"] > 0.4:
                 return []
-            body["from_furniture"] = 0
+            body["from_furniture"] = -1
         elif body["wide"] > 0.3 and (body["pushed"] > 0.6 or was_furniture(body)):
             body["from_furniture"] = 1
             return []
