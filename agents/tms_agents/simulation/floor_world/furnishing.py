@@ -26,6 +26,10 @@ _PIECES = (
 )
 
 
+#: Share of the places where somebody can stand that some laser must see.
+IN_SIGHT = 0.92
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Setting:
     """What kind of room a scenario needs."""
@@ -46,13 +50,16 @@ class Home:
 
 
 def furnish(setting: Setting, laser: Laser, rng: np.random.Generator) -> Home:
-    """A room as the setting wants it; every draw leaves a way from the doors to all of the open floor."""
+    """A room as the setting wants it: there is a way to all of the open floor, and nearly all of it is in sight, since
+    an installer puts a laser where it sees."""
     while True:
         plan = _plan(setting, rng)
         mounts = _mounts(plan, setting, laser, rng)
         furniture = _pieces(plan, mounts, setting, rng)
         if furniture is not None and _walkable(plan, furniture):
-            return Home(plan, furniture, mounts)
+            home = Home(plan, furniture, mounts)
+            if _in_sight(home) >= IN_SIGHT:
+                return home
 
 
 def live_room(home: Home, rng: np.random.Generator, feet: FeetKind) -> LiveRoom:
@@ -159,6 +166,15 @@ def _near(piece: Furniture, other: Furniture, border: list[Xy]) -> bool:
         float(to_box(theirs, piece.pose, piece.width, piece.depth).min()),
     )
     return nearest < 0.25
+
+
+def _in_sight(home: Home) -> float:
+    """Share of the floor, in steps of 30 cm, to which a laser has a free line of sight."""
+    ways = Ways(home.plan, home.furniture, (), 0.24)
+    grid = [(x, y) for x in np.arange(0.3, home.plan.width, 0.3) for y in np.arange(0.3, home.plan.depth, 0.3)]
+    spots = [xy for xy in grid if home.plan.contains(xy, 0.25) and ways.is_free(xy)]
+    room = live_room(home, np.random.default_rng(0), "legs")
+    return float(np.mean([any(room.in_view(name, xy, 0.05) for name in room.mounts) for xy in spots]))
 
 
 def _walkable(plan: Plan, furniture: list[Furniture]) -> bool:

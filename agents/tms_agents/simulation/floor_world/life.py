@@ -68,6 +68,8 @@ class Life:
     def __init__(self, plan: Plan, room: LiveRoom, rng: np.random.Generator) -> None:
         self.plan, self.room, self.rng = plan, room, rng
         self.now = 0.0
+        #: Between the middles of two people: shoulders are 45 cm wide, and turn a little where it is narrow.
+        self.closest_m = 0.38
         self.movers: dict[str, Mover] = {}
         self.stays: list[Stay] = []
         self.motions: list[Motion] = []

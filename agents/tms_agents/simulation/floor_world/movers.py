@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,10 +15,8 @@ from tms_agents.simulation.floor_world.tasks import Do, Drag, Face, Go, Sit, Sto
 if TYPE_CHECKING:
     from tms_agents.simulation.floor_world.life import Life
 
-#: People keep about this far from each other's middle, less when they pass.
-_PERSONAL_M = 0.36
-#: And never come nearer than this.
-_CLOSEST_M = 0.3
+#: People never come nearer to each other's middle than ``Life.closest_m``, and keep off by a little more.
+_PERSONAL = 1.2
 #: What feet can do to speed up, slow down and turn, m/s2.
 _PUSH = 2.0
 _SWAY_M = 0.02
@@ -118,17 +115,17 @@ class Mover:
             pace * (self._path[0][1] - self.xy[1]) / gap,
         )
         if self.size is None:
-            self._push_on(self._give_way(life.others(self), wish), life, dt)
+            self._push_on(self._give_way(life, wish), life, dt)
         else:
             self._drive(wish, life, dt)
 
-    def _give_way(self, others: Sequence[Mover], wish: Xy) -> Xy:
+    def _give_way(self, life: Life, wish: Xy) -> Xy:
         """Away from who is near, and past him on the right."""
         x, y = wish
-        for other in others:
+        for other in life.others(self):
             dx, dy = self.xy[0] - other.xy[0], self.xy[1] - other.xy[1]
             apart = math.hypot(dx, dy) or 1e-6
-            reach = _PERSONAL_M if other.size is None else other.radius + 0.25
+            reach = _PERSONAL * life.closest_m if other.size is None else other.radius + 0.25
             if apart > reach + 0.6 or (other.walker is not None and other.walker.lifted):
                 continue
             push = 1.2 * math.exp(-(apart - reach) / 0.12)
@@ -157,7 +154,7 @@ class Mover:
         """Not nearer to anybody than one can be, or at least not nearer than now."""
         for other in life.others(self):
             robots = (self.size is not None) + (other.size is not None)
-            least = _CLOSEST_M if not robots else self.radius + other.radius - (0.1 if robots == 1 else 0.0)
+            least = life.closest_m if not robots else self.radius + other.radius - (0.1 if robots == 1 else 0.0)
             apart = math.dist(there, other.xy)
             if apart < least and apart < math.dist(self.xy, other.xy) and not (other.walker and other.walker.lifted):
                 return False

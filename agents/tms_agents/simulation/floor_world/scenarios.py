@@ -37,8 +37,9 @@ def _come_in(life: Life, i: int = 0) -> Xy:
     return life.plan.outside(doors[i % len(doors)], life.rng)
 
 
-def _crossing(people: int, eager: float) -> Callable[[Life, float], None]:
+def _crossing(people: int, eager: float, closest_m: float = 0.38) -> Callable[[Life, float], None]:
     def write(life: Life, duration: float) -> None:
+        life.closest_m = closest_m
         for i in range(people):
             until = duration - life.rng.uniform(0, 12)
 
@@ -318,7 +319,7 @@ def _crowd(life: Life, duration: float) -> None:
 SCENARIOS: dict[str, Scenario] = {
     "one": Scenario(description="one walker", duration=60, write=_crossing(1, 0.0)),
     "three": Scenario(description="three walkers cross within half a metre", duration=100, write=_crossing(3, 0.4)),
-    "three close": Scenario(description="three walkers at close quarters", duration=100, write=_crossing(3, 1.0)),
+    "three close": Scenario(description="three walkers at close quarters", duration=100, write=_crossing(3, 1.0, 0.3)),
     "eight": Scenario(description="eight walkers", duration=90, write=_crossing(8, 0.4), setting=_LARGE),
     "things": Scenario(description="things of 3 to 15 cm come and go", duration=260, write=_things),
     "near wall": Scenario(description="things less than 10 cm before a wall", duration=260, write=_near_wall),
