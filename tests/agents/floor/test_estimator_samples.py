@@ -1,42 +1,74 @@
-"""The estimator on recorded samples."""
+"""The estimator on recorded samples: simulated ones with truth, real ones with the number of people."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tms_agents.devices.scans import Sweep
-from tms_agents.floor import Appeared, FloorEstimator, Sensor, Vanished
+from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, Sensor, Vanished
+
+pytestmark = pytest.mark.realdata
 
 
-def sensor(data: np.lib.npyio.NpzFile) -> Sensor:
-    """The sensor of a sample."""
-    sweep = Sweep(
-        data["angles"].astype(float),
-        float(data["time_increment"]),
-        1.0 / float(data["scan_rate"]),
-        float(data["range_min"]),
-        float(data["range_max"]),
-    )
-    x, y, heading = data["sensor_pose"].tolist()
-    return Sensor(sweep, (x, y, heading))
+def play(path: Path) -> tuple[list[FloorEvent], dict[int, int]]:
+    """All events of a recording, and in how many scans each mover was seen."""
+    data: Any = np.load(path)
+    n = data["ranges"].shape[1]
+    if "angles" in data:
+        angles, pose, period = data["angles"].astype(float), data["sensor_pose"].tolist(), 1 / float(data["scan_rate"])
+    else:
+        angles = float(data["angle_min"]) + np.arange(n) * float(data["angle_increment"])
+        pose, period = (0.0, 0.0, 0.0), float(data["scan_time"])
+    sweep = Sweep(angles, float(data["time_increment"]), period, float(data["range_min"]), float(data["range_max"]))
+    estimator = FloorEstimator({"A": Sensor(sweep, (pose[0], pose[1], pose[2]))})
+    events: list[FloorEvent] = []
+    seen: dict[int, int] = {}
+    times = np.maximum.accumulate(data["t"] - data["t"][0])
+    for t, ranges in zip(times.tolist(), data["ranges"].astype(float), strict=True):
+        events += estimator.scan("A", t, ranges)
+        for label in estimator.labels():
+            if label.kind == "mover" and not label.stale:
+                seen[label.id] = seen.get(label.id, 0) + 1
+    return events, seen
 
 
-@pytest.mark.realdata
-def test_a_box_put_down_and_picked_up_is_one_label(shared_data: Path) -> None:
-    data = np.load(shared_data / "floor/sim/s1_floor_A.npz")
-    estimator = FloorEstimator({"A": sensor(data)})
-    events = [
-        event
-        for t, ranges in zip(data["t"], data["ranges"], strict=True)
-        for event in estimator.scan("A", float(t), ranges.astype(float))
-    ]
-    born = [event for event in events if isinstance(event, Appeared) and event.kind == "object"]
-    assert len(born) == 1
-    assert np.hypot(born[0].xy[0] - 2.465, born[0].xy[1] - 2.388) < 0.06
-    gone = [event for event in events if isinstance(event, Vanished) and event.label == born[0].label]
-    assert len(gone) == 1
-    assert gone[0].earliest <= 41.6
-    assert 41.5 <= gone[0].latest < 43.0
+def objects(events: list[FloorEvent]) -> list[Appeared]:
+    return [event for event in events if isinstance(event, Appeared) and event.kind == "object"]
+
+
+@pytest.mark.parametrize("name", ["s1_floor", "s1_leg"])
+def test_a_box_put_down_and_picked_up_is_one_label(shared_data: Path, name: str) -> None:
+    events, _ = play(shared_data / f"floor/sim/{name}_A.npz")
+    (born,) = objects(events)
+    assert math.hypot(born.xy[0] - 2.465, born.xy[1] - 2.388) < 0.06
+    (gone,) = [event for event in events if isinstance(event, Vanished) and event.label == born.label]
+    assert gone.earliest <= 41.6
+    assert 41.5 <= gone.latest < 43.0
+
+
+@pytest.mark.parametrize("name", ["s3_floor", "s3_leg"])
+def test_what_a_robot_and_a_foot_hide_is_kept(shared_data: Path, name: str) -> None:
+    events, _ = play(shared_data / f"floor/sim/{name}_A.npz")
+    gone = {event.label for event in events if isinstance(event, Vanished)}
+    for x, y, taken in ((3.1921, 2.6879, False), (2.8446, 1.1513, False), (2.2346, 2.8643, True)):
+        there = [event for event in objects(events) if math.hypot(event.xy[0] - x, event.xy[1] - y) < 0.12]
+        assert len(there) == 1
+        assert (there[0].label in gone) == taken
+
+
+@pytest.mark.parametrize(("name", "people"), [("tamu_people_1", 1), ("tamu_people_4", 1), ("tamu_people_5", 2)])
+def test_the_number_of_people_of_real_recordings(shared_data: Path, name: str, people: int) -> None:
+    events, seen = play(shared_data / f"floor/real/{name}.npz")
+    assert len(seen) == people
+    assert not objects(events)
+
+
+def test_the_walker_of_the_laboratory_keeps_a_label(shared_data: Path) -> None:
+    events, seen = play(shared_data / "floor/real/irvs_human_tracker3.npz")
+    assert max(seen.values()) > 350
+    assert not objects(events)
