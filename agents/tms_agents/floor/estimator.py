@@ -12,10 +12,11 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, look
 from tms_agents.floor.furniture import Furniture, Piece
+from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Masks
 from tms_agents.floor.objects import Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
-from tms_agents.floor.settings import FloorSettings, Scene, Sensor
+from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.tracks import Tracks
 from tms_agents.floor.view import View
@@ -46,6 +47,7 @@ class FloorEstimator:
         self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
+        self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
         self._labels = 0
@@ -81,6 +83,10 @@ class FloorEstimator:
         """Everything on the floor now, oldest label first."""
         return sorted(self._tracks.labels(self._t) + self._objects.labels(), key=lambda label: label.id)
 
+    def poses(self) -> dict[str, Pose]:
+        """Where the sensors are: as given, refined by what several of them have seen of the same walkers."""
+        return {name: self._extrinsics.pose(view.index) for name, view in self._views.items()}
+
     def _understand(self, view: View, states: NDArray[np.int8], t: float, dt: float) -> list[FloorEvent]:
         bodies, prints = self._tracks.bodies, self._prints
         objects = self._objects
@@ -102,6 +108,9 @@ class FloorEstimator:
         follow(clusters, of, prints, view.index, t, *view.sight)
         somebodys = self._association.step(clusters, of, prints, t, view.sight)
         attend(prints, bodies, t)
+        if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
+            for other in self._views.values():
+                other.move(self._extrinsics.pose(other.index))
         vanished = objects.weigh(self._looks, bodies, t, dt)
         movers = self._tracks.review(
             t,
@@ -174,6 +183,7 @@ class FloorEstimator:
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
             "furniture": self._furniture.save(),
+            "extrinsics": self._extrinsics.save(),
             "labels": self._labels,
             "t": self._t if np.isfinite(self._t) else None,
         }
@@ -209,6 +219,7 @@ class FloorEstimator:
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
             self._furniture.restore(state["furniture"])
+            self._extrinsics.restore(state["extrinsics"])
             self._labels = int(state["labels"])
             self._t = -np.inf if state["t"] is None else float(state["t"])
         except (KeyError, TypeError) as error:

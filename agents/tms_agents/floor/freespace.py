@@ -118,9 +118,9 @@ def look(
                 out.clean = 1 if alien == 0 and b - a + 1 == hits else 0
                 break
             if 2 * beyond >= total and hidden == 0:
+                # Another way, by a mirror, may still show it.
                 out.verdict = FREE
-                break
-            if out.verdict == UNSEEN and hidden > 0:
+            elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
 
 

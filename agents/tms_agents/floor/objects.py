@@ -44,11 +44,13 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
                 thing.half += gain * (0.5 * seen.width - thing.half)
                 thing.var = _SURFACE_VAR + 1e-4 / (thing.hits + 1)
         elif seen.verdict == FREE:
+            # Since the last look by any sensor, but no longer than a scan takes: between them it was hidden.
             thing.free += min(dt, t - thing.free_at, 0.2)
             thing.doubt += min(_PER_SCAN, -np.log(max(1.0 - thing.rate, 1e-3)))
             if thing.doubt < 4.0:
                 thing.rate -= 0.02 * thing.rate
-        thing.free_at = t
+        if seen.verdict == HIT or seen.verdict == FREE:
+            thing.free_at = t
         if thing.free > 0.0:
             waiting += 1
     return waiting
