@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 #: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and than its parent's best.
 _KEPT, _WORSE, _BRANCH = 8, 14.0, 7.0
 _CHILDREN = 32
+#: Bodies so near each other (m, each axis), on the same prints, are at the same place.
+_NEAR_M = 0.08
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
@@ -130,15 +132,28 @@ def _complete(
 
 @njit(cache=True)
 def _same(one: Any, two: Any) -> bool:
-    """Whether two hypotheses say the same of the movers: every label at the same place on the same prints."""
+    """Whether two hypotheses put the movers at the same places on the same prints, whoever is who.
+
+    Then nothing that comes can tell them apart: which of them is right has to be decided by what has been.
+    """
     for b in range(one.size):
-        p, q = one[b], two[b]
-        if not (p.used and p.confirmed) and not (q.used and q.confirmed):
+        p = one[b]
+        if not (p.used and p.confirmed):
             continue
-        if p.used != q.used or p.label != q.label or abs(p.x - q.x) > 0.06 or abs(p.y - q.y) > 0.06:
-            return False
-        straight = p.a_print == q.a_print and p.b_print == q.b_print
-        if not straight and not (p.a_print == q.b_print and p.b_print == q.a_print):
+        found = False
+        for o in range(two.size):
+            # Most often it is the same one.
+            q = two[(b + o) % two.size]
+            if not (q.used and q.confirmed):
+                continue
+            near = _NEAR_M if p.a_print < 0 and p.b_print < 0 else 4.0 * _NEAR_M
+            if abs(p.x - q.x) > near or abs(p.y - q.y) > near:
+                continue
+            straight = p.a_print == q.a_print and p.b_print == q.b_print
+            if straight or (p.a_print == q.b_print and p.b_print == q.a_print):
+                found = True
+                break
+        if not found:
             return False
     return True
 
