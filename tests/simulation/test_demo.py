@@ -101,6 +101,16 @@ def test_once_leaves_after_the_story_and_weight_knows_before_the_tag_is_read(tmp
     assert_stopped(out)
 
 
+def test_at_its_own_speed_a_laser_sees_the_floor(tmp_path: Path) -> None:
+    """Raw scans of an emulated laser, through the agent, to the same pies."""
+    done = tms_demo("--once", "--port", "0", "--data-dir", str(tmp_path))
+    out, err = done.communicate(timeout=170)
+    assert done.returncode == 0, out + err
+    assert re.search(r"floor: laser tcp 127\.0\.0\.1:\d+; tms agent floor --config", out)
+    assert "Every pie is as in the paper, within 0.02." in out
+    assert_stopped(out)
+
+
 def test_ctrl_c_leaves_cleanly_and_stops_server_and_agents(tmp_path: Path) -> None:
     demo = tms_demo("--speed", "20", "--data-dir", str(tmp_path))
     assert demo.stdout is not None
@@ -154,7 +164,7 @@ def tms_demo(*arguments: str) -> subprocess.Popen[str]:
 def running(out: str) -> dict[int, str]:
     """The processes of the agents that the demo named, by their numbers."""
     configs = re.findall(r"tms agent \w+ --config (\S+)", out)
-    assert len(configs) == 4
+    assert len(configs) == (5 if "tms agent floor" in out else 4)
     found = {}
     for entry in Path("/proc").iterdir():
         with contextlib.suppress(OSError):

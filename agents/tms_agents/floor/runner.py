@@ -92,6 +92,7 @@ class Understanding:
         self._waiting: deque[tuple[str, float, Sequence[Scan]]] = deque(maxlen=_WAITING)
         self._come = asyncio.Event()
         self.left_out = 0
+        self._warming, self._warm = asyncio.Lock(), False
 
     def take(self, laser: str, scans: Sequence[Scan]) -> None:
         if len(self._waiting) == _WAITING:
@@ -101,11 +102,17 @@ class Understanding:
         self._waiting.append((laser, self._clocks.now(), scans))
         self._come.set()
 
+    async def warm(self) -> None:
+        """Have the estimator compiled; once is enough."""
+        async with self._warming:
+            if not self._warm:
+                await self.call(warm_up)
+                self._warm = True
+
     async def call(self, work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     async def work(self) -> None:
-        await self.call(warm_up)
         while True:
             await self._come.wait()
             self._come.clear()
@@ -145,6 +152,7 @@ class _Work:
             floor.hear = self._recorder.hear
 
     async def forever(self) -> None:
+        await self._mind.warm()  # an agent that cannot follow yet says nothing
         await self._outbox.post_inventory()
         async with asyncio.TaskGroup() as tasks:
             for laser in self._config.lasers:

@@ -14,7 +14,7 @@ import numpy as np
 from tms_agents.clocks import Clocks
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.transport import DeviceState
-from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.config import FloorConfig, LaserSection
 from tms_agents.floor.core import Floor
 from tms_agents.floor.formats import Recorded, in_time
 from tms_agents.floor.live_view import LiveView
@@ -50,7 +50,12 @@ async def watch_lasers(config: FloorConfig, poses: Mapping[str, Pose]) -> AsyncG
     numbers = itertools.count(1)
     floor = Floor(config, poses, clocks, lambda: f"new/{next(numbers)}", saved)
     mind = Understanding(floor, clocks, lambda observations: None)
-    work = [asyncio.create_task(listen(one, config.silent_after_s, mind.take, floor.line)) for one in config.lasers]
+
+    async def look(laser: LaserSection) -> None:
+        await mind.warm()
+        await listen(laser, config.silent_after_s, mind.take, floor.line)
+
+    work = [asyncio.create_task(look(one)) for one in config.lasers]
     work.append(asyncio.create_task(mind.work()))
     try:
         while not any(task.done() for task in work):

@@ -30,7 +30,8 @@ from tms_schemas.objects import ObjectFields, ProductIn
 class Plan:
     """How to play: against ``url``, or a server of our own with its data in ``data_dir``.
 
-    ``port``: 0 is a free one; None is the usual one, or a free one where that is taken.
+    ``port``: 0 is a free one; None is the usual one, or a free one where that is taken. ``laser``: whether an emulated
+    laser sees the floor; None: at a speed that it can follow.
     """
 
     url: str | None = None
@@ -41,6 +42,7 @@ class Plan:
     weights: bool = False
     once: bool = False
     speed: float = 1.0
+    laser: bool | None = None
     seed: int = 0
 
 
@@ -55,7 +57,17 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
             register(town, plan)
             terminal.say("starting the agents ...")
             stage, player = stack.enter_context(
-                staged(town, url, plan.key, plan.room, work, seed=plan.seed, speed=plan.speed, clock=clock)
+                staged(
+                    town,
+                    url,
+                    plan.key,
+                    plan.room,
+                    work,
+                    seed=plan.seed,
+                    speed=plan.speed,
+                    laser=plan.speed <= 1.0 if plan.laser is None else plan.laser,
+                    clock=clock,
+                )
             )
             terminal.devices(stage.hardware.plugs, stage.configs)
             player.play(furnish(player.world))

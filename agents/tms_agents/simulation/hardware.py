@@ -7,36 +7,47 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AsyncExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.simulation.cabinet_bench import CabinetBench
 from tms_agents.simulation.robot_bench import STATE_S, RobotBench
-from tms_agents.simulation.room import CABINETS, ROBOT, ROBOT_AGENT
+from tms_agents.simulation.room import CABINETS, FLOOR_AGENT, ROBOT, ROBOT_AGENT
 from tms_agents.simulation.world import World
+from tms_client.cli import CommandError
+
+if TYPE_CHECKING:
+    from tms_agents.simulation.floor_bench import FloorBench
 
 T = TypeVar("T")
+#: Of the laser's line; a sweep takes 25 ms.
+_LASER_TICK_S = 0.005
 
 
 @dataclass(frozen=True, slots=True)
 class Plugs:
-    """Where the devices of one agent are plugged in: ``loads`` a load-cell board, ``states`` the robot's controller."""
+    """Where the devices of one agent are plugged in.
 
-    reader: str
+    ``loads`` is a load-cell board, ``states`` the robot's controller, ``laser`` looks over the floor.
+    """
+
+    reader: str | None = None
     loads: str | None = None
     states: tuple[str, int] | None = None
+    laser: tuple[str, int] | None = None
 
 
 class Hardware:
     """All devices of the room; made by ``plugged_in``."""
 
-    def __init__(self, seed: int) -> None:
-        names = [*(one.id for one in CABINETS), ROBOT_AGENT]
+    def __init__(self, seed: int, *, laser: bool = False) -> None:
+        names = [*(one.id for one in CABINETS), ROBOT_AGENT, FLOOR_AGENT]
         streams = dict(zip(names, np.random.default_rng(seed).spawn(len(names)), strict=True))
         self.cabinets: Mapping[str, CabinetBench] = {one.id: CabinetBench(one, streams[one.id]) for one in CABINETS}
         self.robot = RobotBench(ROBOT, streams[ROBOT_AGENT])
+        self.floor = _floor_bench(streams[FLOOR_AGENT]) if laser else None
         self.plugs: dict[str, Plugs] = {}
         self._loop = asyncio.new_event_loop()
         self._unplug = asyncio.Event()
@@ -49,6 +60,8 @@ class Hardware:
         for bench in self.cabinets.values():
             bench.follow(world)
         self.robot.follow(world)
+        if self.floor is not None:
+            self.floor.follow(world)
 
     def _call(self, work: Callable[[], T]) -> T:
         """Run in the devices' thread."""
@@ -69,6 +82,10 @@ class Hardware:
             await stack.enter_async_context(hand)
             await stack.enter_async_context(states)
             self.plugs[ROBOT_AGENT] = Plugs(reader=hand.path, states=(states.host, states.port))
+            if self.floor is not None:
+                laser = TcpLine(self.floor.device, tick_s=_LASER_TICK_S)
+                await stack.enter_async_context(laser)
+                self.plugs[FLOOR_AGENT] = Plugs(laser=(laser.host, laser.port))
             ready()
             await self._unplug.wait()
 
@@ -90,9 +107,21 @@ class Hardware:
         return stop
 
 
+def _floor_bench(rng: np.random.Generator) -> FloorBench:
+    try:
+        from tms_agents.simulation.floor_bench import FloorBench
+    except ImportError as error:
+        if error.name is None or error.name.startswith("tms_"):
+            raise
+        raise CommandError(
+            f'the laser needs {error.name}: pip install "robot-town-tms[slam]", or leave it out (--no-laser)'
+        ) from error
+    return FloorBench(rng)
+
+
 @contextmanager
-def plugged_in(seed: int) -> Iterator[Hardware]:
-    hardware = Hardware(seed)
+def plugged_in(seed: int, *, laser: bool = False) -> Iterator[Hardware]:
+    hardware = Hardware(seed, laser=laser)
     stop = hardware.start()
     try:
         yield hardware

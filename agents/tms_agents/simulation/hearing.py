@@ -18,14 +18,18 @@ from tms_schemas.events import Kind
 
 #: A board that delivers has learnt its empty load after this.
 _ZERO_S = 1.0
+#: And a laser the empty room.
+_FLOOR_S = 9.0
 _THINGS = {"cabinet": "on its board", "floor": "on the floor", "robot": "in the hand", "table": "put on furniture"}
 
 
 class Hearing:
     """``late`` asks the server; tags that were found read at their place are not asked for again."""
 
-    def __init__(self, town: Town, room: str, monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._town, self._room, self._monotonic = town, room, monotonic
+    def __init__(
+        self, town: Town, room: str, monotonic: Callable[[], float] = time.monotonic, *, laser: bool = False
+    ) -> None:
+        self._town, self._room, self._monotonic, self._laser = town, room, monotonic, laser
         self._connected_at: float | None = None
         self._read: dict[str, Place] = {}
 
@@ -37,19 +41,23 @@ class Hearing:
         return self._untold(world, labels) or self._unread(world, labels, wish.unread) or None
 
     def _unconnected(self, world: World) -> str:
-        for agent in (*world.cabinets, ROBOT_AGENT):
+        for agent in (*world.cabinets, ROBOT_AGENT, *([FLOOR_AGENT] if self._laser else [])):
             view = self._town.agents.get(agent)
             if view.state == "unknown":
                 return f"agent {agent} has not said anything"
             if view.state != "connected":
                 return f"agent {agent} is {view.state}: {view.why}"
         movers = Counter(one.agent for one in self._town.movers(self._room).movers)
-        for agent in (FLOOR_AGENT, ROBOT_AGENT):
+        # On the bed nobody is in the plane of a laser.
+        for agent in (ROBOT_AGENT,) if self._laser else (FLOOR_AGENT, ROBOT_AGENT):
             if not movers[agent]:
                 return f"agent {agent} has told of nobody in the room"
         if self._connected_at is None:
             self._connected_at = self._monotonic()
-        return "the boards learn their empty load" if self._monotonic() < self._connected_at + _ZERO_S else ""
+        passed = self._monotonic() - self._connected_at
+        if self._laser and passed < _FLOOR_S:
+            return "the floor sensor learns the empty room"
+        return "the boards learn their empty load" if passed < _ZERO_S else ""
 
     def _untold(self, world: World, answer: LabelsAnswer) -> str:
         told = Counter((one.agent, one.kind) for one in answer.labels if not one.ghost)

@@ -9,11 +9,22 @@ from tms_agents.cabinet.calibration_file import write_calibration
 from tms_agents.simulation.cabinet_bench import CabinetBench
 from tms_agents.simulation.hardware import Hardware, Plugs
 from tms_agents.simulation.robot_bench import GRIPPER, URDF
-from tms_agents.simulation.room import HAND_ZONE, ROBOT_AGENT
+from tms_agents.simulation.room import (
+    BED,
+    FLOOR_AGENT,
+    HAND_ZONE,
+    LASER_POSE,
+    ROBOT_AGENT,
+    ROBOT_LANE,
+    ROBOT_SIZE,
+    SIZE,
+)
 
 BOARD = "shelf"
 #: Weigh so long with the field off, then read the tags.
 WEIGH_S = 0.6
+#: The laser is at the height of ankles.
+_FEET = 'feet = "legs"\n'
 
 
 def install(folder: Path, hardware: Hardware, url: str, room: str) -> dict[str, Path]:
@@ -23,19 +34,22 @@ def install(folder: Path, hardware: Hardware, url: str, room: str) -> dict[str, 
         if name == ROBOT_AGENT:
             (folder / "robot.urdf").write_text(URDF)
             text = _hand(plugs)
+        elif name == FLOOR_AGENT:
+            text = _floor(plugs)
         else:
             bench = hardware.cabinets[name]
             write_calibration(folder / f"{name}.calibration.toml", {BOARD: bench.calibration()})
             text = _cabinet(bench, plugs)
         configs[name] = folder / f"{name}.toml"
-        configs[name].write_text(_head(name, url, room) + text)
+        top = _FEET if name == FLOOR_AGENT else ""
+        configs[name].write_text(_head(name, url, room, top) + text)
     return configs
 
 
-def _head(agent: str, url: str, room: str) -> str:
+def _head(agent: str, url: str, room: str, top: str) -> str:
     return f"""agent = {_text(agent)}
 room = {_text(room)}
-
+{top}
 [server]
 url = {_text(url)}
 linger_s = 0.02
@@ -88,6 +102,28 @@ tip_link = "{GRIPPER}"
 
 [hands.grasp]
 place_m = 0.15                   # range of the reader in the gripper, and a little more
+"""
+
+
+def _floor(plugs: Plugs) -> str:
+    assert plugs.laser is not None
+    host, port = plugs.laser
+    x, y, theta = LASER_POSE
+    length, width = ROBOT_SIZE
+    w, d = SIZE
+    return f"""
+[[lasers]]
+source = {{ kind = "scip", host = {_text(host)}, port = {port} }}
+pose = {{ x = {x}, y = {y}, theta = {theta} }}
+
+[scene]
+region = [[0.0, 0.0], [{w}, 0.0], [{w}, {d}], [0.0, {d}]]
+seats = [{[list(one) for one in BED]}]
+masks = [{[list(one) for one in ROBOT_LANE]}]         # the robot's lane: it reports itself
+
+[[robots]]
+width = {width}
+length = {length}
 """
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from datetime import datetime, timedelta
 from typing import Protocol
 
-from tms_agents.simulation.floor import FloorAgent
 from tms_agents.simulation.script import Firm, Script, Told
 from tms_agents.simulation.world import World
 from tms_client.cli import CommandError
@@ -16,6 +15,28 @@ from tms_schemas.observation import Observation
 STEP_S = 0.1
 #: Real seconds between two looks at what the agents told, and after which an agent is late.
 LOOK_S, LATE_S = 0.05, 60.0
+#: The agents take longer to start where something is compiled first.
+START_S = 180.0
+
+
+class FloorSensor(Protocol):
+    """What sees people and things on the floor without devices; see ``floor.FloorAgent``."""
+
+    def start(self, world: World, now: datetime) -> list[Observation]:
+        """Switched on."""
+
+    def look(self, world: World, now: datetime) -> list[Observation]:
+        """What changed."""
+
+
+class Elsewhere:
+    """The floor sensor is a device with an agent of its own."""
+
+    def start(self, world: World, now: datetime) -> list[Observation]:
+        return []
+
+    def look(self, world: World, now: datetime) -> list[Observation]:
+        return []
 
 
 class Senses(Protocol):
@@ -40,7 +61,7 @@ class Player:
     def __init__(
         self,
         world: World,
-        floor: FloorAgent,
+        floor: FloorSensor,
         senses: Senses,
         *,
         speed: float,
@@ -84,13 +105,14 @@ class Player:
                 due = self._monotonic()
 
     def _wait(self, wish: Told | Firm) -> None:
-        patience = self._monotonic() + LATE_S
+        starting = isinstance(wish, Told) and wish.connected
+        patience = self._monotonic() + (START_S if starting else LATE_S)
         self._look()
         while (late := self._senses.late(self.world, wish)) is not None:
             if self._monotonic() > patience:
                 if isinstance(wish, Told) and wish.or_go_on:
                     break
-                raise CommandError(f"{late}, for {LATE_S:.0f} s")
+                raise CommandError(f"{late}, for {START_S if starting else LATE_S:.0f} s")
             self._sleep(LOOK_S)
             self._set_clocks()
             self._look()

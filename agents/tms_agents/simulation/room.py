@@ -47,6 +47,15 @@ CABINETS = (
     _cabinet("B", (4.4, 4.45), 0.0),
     _cabinet("C", (5.92, 0.14), math.pi / 2),
 )
+#: Metres; the corner is the origin.
+SIZE = (6.0, 5.0)
+BED = [(0.15, 0.25), (1.15, 0.25), (1.15, 2.3), (0.15, 2.3)]
+TABLE = [(3.3, 2.3), (4.6, 2.3), (4.6, 3.1), (3.3, 3.1)]
+#: Where the laser of the floor sensor is, and the robot's length and width as it sees them.
+LASER_POSE = (0.05, 3.3, -0.1)
+ROBOT_SIZE = (0.45, 0.4)
+#: Where only the robot drives, which reports itself: the floor sensor need not look there.
+ROBOT_LANE = [(2.65, 0.1), (4.35, 0.1), (4.35, 2.25), (2.65, 2.25)]
 #: Zone of the reader in the robot's hand: whatever it reads is somewhere in the room.
 HAND_ZONE = "hand"
 
@@ -62,7 +71,7 @@ SPOTS: Mapping[str, Xy] = {
     "front of C": (4.95, 0.9),
     "south": (3.3, 1.0),
     "dock": (2.9, 0.45),
-    "meeting": (2.95, 2.0),
+    "meeting": (3.1, 2.0),
     "table side": (3.9, 1.85),
 }
 WAYS = (
@@ -108,7 +117,7 @@ def new_world() -> World:
 
 def description(params: Mapping[str, Any] | None = None, seed: int = 0) -> RoomIn:
     """The room as the server is told of it."""
-    outline = _box(0.0, 0.0, 6.0, 5.0)
+    outline = _box(0.0, 0.0, *SIZE)
     return RoomIn(
         name="Care room (simulated)",
         frame="origin at the south-west corner, x to the east, y to the north",
@@ -124,17 +133,17 @@ def description(params: Mapping[str, Any] | None = None, seed: int = 0) -> RoomI
                 )
                 for one in CABINETS
             ),
-            Furniture(id="bed", name="Bed", polygon=_box(0.15, 0.25, 1.15, 2.3)),
+            Furniture(id="bed", name="Bed", polygon=BED),
             Furniture(
                 id="table",
                 name="Table",
-                polygon=_box(3.3, 2.3, 4.6, 3.1),
-                surfaces=[Surface(id="top", polygon=_box(3.3, 2.3, 4.6, 3.1), z=TABLE_Z)],
+                polygon=TABLE,
+                surfaces=[Surface(id="top", polygon=TABLE, z=TABLE_Z)],
             ),
         ],
         sensors=[
             *(Sensor(agent=one.id, kind="cabinet", zones=[Zone(id=one.id, polygon=one.outline)]) for one in CABINETS),
-            Sensor(agent=FLOOR_AGENT, kind="floor", pose=(3.0, 0.05, 1.57)),
+            Sensor(agent=FLOOR_AGENT, kind="floor", pose=LASER_POSE),
             Sensor(agent=ROBOT_AGENT, kind="robot", zones=[Zone(id=HAND_ZONE, polygon=outline)]),
         ],
         params=dict(params or {}),

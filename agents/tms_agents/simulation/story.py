@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from tms_agents.simulation.room import PERSON, ROBOT, SPOTS, START, TABLE_SURFACE, TABLE_Z, route
-from tms_agents.simulation.script import Firm, Script, Told, reach, walk
+from tms_agents.simulation.script import Firm, Script, Told, reach, wait, walk
 from tms_agents.simulation.world import World
 
 #: Numbers of the objects that are moved, as in the paper.
@@ -15,6 +15,8 @@ MOVED = (2, 3, 4)
 TOLERANCE = 0.02
 #: Object number -> place in words (see ``pies.place_of``) -> probability.
 Pies = Mapping[int, Mapping[str, float]]
+#: Where a thing falls to the floor.
+DROPPED = (1.42, 0.62)
 #: The robot's gripper, metres ahead and above the floor.
 TO_A_PERSON, CARRYING = (0.4, 0.8), (0.4, 1.1)
 
@@ -59,12 +61,13 @@ def take_three(world: World) -> Script:
 def drop_one(world: World) -> Script:
     world.movers[ROBOT].walk(route("dock", "meeting"))
     yield from walk(world, PERSON, "front of B", "north", "bedside")
-    world.drop(PERSON, world.tag_of(3), (1.42, 0.62))
+    world.drop(PERSON, world.tag_of(3), DROPPED)
+    yield from wait(world, 4.0)
+    yield from walk(world, PERSON, "bedside", "middle")
     yield Told()
 
 
 def hand_over(world: World) -> Script:
-    yield from walk(world, PERSON, "bedside", "middle")
     world.movers[ROBOT].face(SPOTS["middle"])
     yield from reach(world, ROBOT, TO_A_PERSON)
     world.give(PERSON, world.tag_of(2), ROBOT)

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TextIO
 
 from tms_agents.simulation import pies
 from tms_agents.simulation.hardware import Plugs
 from tms_agents.simulation.processes import command
+
+
+def _devices(plug: Plugs) -> Iterator[str]:
+    if plug.loads:
+        yield f"load cells {plug.loads}"
+    if plug.reader:
+        yield f"TR3 {plug.reader}"
+    if plug.states:
+        yield f"joints and fingers tcp {plug.states[0]}:{plug.states[1]}"
+    if plug.laser:
+        yield f"laser tcp {plug.laser[0]}:{plug.laser[1]}"
 
 
 class Terminal:
@@ -29,9 +40,7 @@ class Terminal:
         self.say("\nThe agents read emulated devices; name your own in such a file to use them instead:")
         for agent, plug in plugs.items():
             start = " ".join(["tms", *command(agent, configs[agent])])
-            board = f"load cells {plug.loads}, " if plug.loads else ""
-            states = f", joints and fingers tcp {plug.states[0]}:{plug.states[1]}" if plug.states else ""
-            self.say(f"  {agent}: {board}TR3 {plug.reader}{states}; {start}")
+            self.say(f"  {agent}: {', '.join(_devices(plug))}; {start}")
         self.say("Things are put into the cabinets, one by one; boards and readers take their time ...")
 
     def step(self, number: int, title: str) -> None:

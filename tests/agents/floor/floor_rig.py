@@ -64,7 +64,7 @@ class Room:
     def ranges(self, sweep: Sweep, pose: tuple[float, float, float]) -> np.ndarray:
         x, y, theta = pose
         cos, sin = np.cos(sweep.angles + theta), np.sin(sweep.angles + theta)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             to_x = np.where(cos > 0, (WIDTH - x) / cos, np.where(cos < 0, -x / cos, np.inf))
             to_y = np.where(sin > 0, (DEPTH - y) / sin, np.where(sin < 0, -y / sin, np.inf))
         far = np.minimum(to_x, to_y)
