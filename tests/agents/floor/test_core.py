@@ -1,0 +1,172 @@
+"""A whole floor without I/O, in made-up time: several lasers, mounting, restarts, what cannot be used."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import logging
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from floor_rig import COMES, GONE, PUT_AT, QUICK, Room, config_toml, laser_toml, story, sweep
+
+from tms_agents.clocks import Clocks
+from tms_agents.config import read_config
+from tms_agents.devices.scans import Scan
+from tms_agents.devices.transport import DeviceState
+from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.core import Floor
+from tms_schemas.observation import Inventory, LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft
+
+SOUTH, WEST = (2.5, 0.05, math.pi / 2), (0.05, 2.4, 0.0)
+SWEEP = sweep()
+
+
+class Bench:
+    """Lasers in a ``Room`` feed a ``Floor``; time passes with ``run``."""
+
+    def __init__(self, folder: Path, poses, saved=None, start: float = 1000.0, **laser: str) -> None:
+        text = "".join(
+            laser_toml('{ kind = "scip", host = "h" }', pose, name, laser.get(name, "")) for name, pose in poses.items()
+        )
+        path = folder / "floor.toml"
+        path.write_text(config_toml("lab", "http://127.0.0.1:1", text, more=QUICK))
+        self.now, self.poses, self.room = start, poses, Room()
+        clocks = Clocks(lambda: self.now, lambda: self.now, after=(saved or {}).get("t", -math.inf))
+        numbers = itertools.count(50 if saved else 1)
+        config = read_config(path, FloorConfig)
+        self.floor = Floor(config, {}, clocks, lambda: f"lab-floor/{next(numbers)}", saved)
+        self.sweeps = dict.fromkeys(poses, SWEEP)
+        for name in poses:
+            self.floor.line(name, DeviceState("connected", "test"))
+
+    def run(self, seconds: float, play=lambda t: None, only: str | None = None, scan=None):
+        found, start = [], self.now
+        for _ in range(round(seconds / 0.1)):
+            self.now += 0.1
+            play(self.now - start)
+            for name, pose in self.poses.items():
+                if only in (None, name):
+                    made = scan(name) if scan else self.room.scan(self.sweeps[name], pose, self.now - 0.04)
+                    found += self.floor.scans(name, self.now, [made])
+        return found
+
+
+def kinds(observations):
+    return [type(one) for one in observations if not isinstance(one, LabelMoved)]
+
+
+def test_two_lasers_see_one_walker_and_one_thing(tmp_path):
+    bench = Bench(tmp_path, {"south": SOUTH, "west": WEST})
+    assert bench.run(COMES) == []
+    found = bench.run(GONE - COMES + 5.0, lambda t: story(bench.room, t + COMES))
+    assert kinds(found) == [MoverEntered, LabelAppeared, MoverLeft]
+    (thing,) = [one for one in found if isinstance(one, LabelAppeared)]
+    assert math.dist(thing.xy, PUT_AT) < 0.03
+    assert bench.floor.inventory().labels[0].label == thing.label
+    assert [one.state for one in bench.floor.states().values()] == ["connected", "connected"]
+    assert any("appeared" in text for _, text in bench.floor.story)
+
+
+def test_a_laser_that_does_not_come_is_not_waited_for_and_comes_later(tmp_path):
+    bench = Bench(tmp_path, {"south": SOUTH, "west": WEST})
+    bench.run(4.0, only="south")
+    assert bench.floor.estimator is None
+    bench.run(4.0, only="south")
+    bench.room.put("thing", *PUT_AT)
+    (appeared,) = bench.run(5.0, only="south")
+    assert isinstance(appeared, LabelAppeared)
+    found = bench.run(4.0)  # both: the floor is learnt anew, and that is told
+    assert isinstance(found[0], Inventory) and found[0].labels == []
+    assert kinds(found[1:]) == [], "what lay there is background for the new one"
+
+
+def test_upside_down(tmp_path):
+    bench = Bench(tmp_path, {"south": SOUTH}, south="upside_down = true")
+
+    def scan(name):
+        seen = bench.room.scan(SWEEP, SOUTH, bench.now - 0.04)
+        return replace(seen, ranges=seen.ranges[::-1])  # it sweeps the other way
+
+    bench.run(4.0, scan=scan)
+    bench.room.put("thing", *PUT_AT)
+    (appeared,) = bench.run(4.0, scan=scan)
+    assert math.dist(appeared.xy, PUT_AT) < 0.03
+
+
+@pytest.fixture
+def saved(tmp_path):
+    bench = Bench(tmp_path, {"south": SOUTH})
+    bench.run(4.0)
+    bench.room.put("thing", *PUT_AT)
+    (appeared,) = bench.run(4.0)
+    return json.loads(json.dumps(bench.floor.to_dict())), appeared.label, bench.now
+
+
+def test_a_restart_goes_on_where_it_was(tmp_path, saved):
+    state, label, now = saved
+    again = Bench(tmp_path, {"south": SOUTH}, state, now + 60.0)
+    assert [one.label for one in again.floor.inventory().labels] == [label]
+    again.room.put("thing", *PUT_AT)
+    assert again.run(3.0) == [], "nothing has changed"
+    again.room.take("thing")
+    (gone,) = again.run(3.0)
+    assert isinstance(gone, LabelVanished) and gone.label == label
+
+
+def test_a_clock_that_went_back_over_a_restart(tmp_path, saved):
+    state, label, now = saved
+    again = Bench(tmp_path, {"south": SOUTH}, state, now - 500.0)
+    again.room.put("thing", *PUT_AT)
+    assert again.run(3.0) == []
+    assert [one.label for one in again.floor.inventory().labels] == [label]
+
+
+@pytest.mark.parametrize("change", ["pose", "lasers", "damaged", "format", "labels"])
+def test_a_state_that_does_not_fit_is_said_and_left_out(tmp_path, saved, caplog, change):
+    state, _, now = saved
+    poses = {"south": SOUTH}
+    if change == "pose":
+        poses = {"south": (2.6, 0.05, math.pi / 2)}
+    elif change == "lasers":
+        poses = {"north": SOUTH}
+    elif change == "damaged":
+        state["estimator"]["things"]["data"] = "AAAA"
+    elif change == "format":
+        state["estimator"]["format"] = 99
+    else:
+        state["labels"] = {"things": {"x": []}}
+    with caplog.at_level(logging.WARNING):
+        again = Bench(tmp_path, poses, state, now + 60.0)
+    assert "does not fit, starting anew" in caplog.text
+    assert again.floor.inventory().labels == []
+    again.run(4.0)
+    again.room.put("thing", *PUT_AT)
+    (appeared,) = again.run(4.0)
+    assert int(appeared.label.partition("/")[2]) >= 50
+
+
+@pytest.mark.parametrize(
+    ("ranges", "says"),
+    [
+        (np.full(361, 0.03), "100% of the beams end at its window"),
+        (np.full(361, np.nan), "100% of the beams are errors"),
+        (np.full(361, 3.0), "it repeats one scan"),
+    ],
+)
+def test_what_says_nothing_of_the_room_is_a_fault_and_makes_nothing_up(tmp_path, ranges, says):
+    bench = Bench(tmp_path, {"south": SOUTH})
+    bench.run(4.0)
+    (state,) = bench.floor.states().values()
+    assert state.state == "connected"
+    found = bench.run(4.0, scan=lambda name: Scan(SWEEP, ranges.copy(), None, bench.now - 0.04))
+    (state,) = bench.floor.states().values()
+    assert state.state == "faulty" and state.why.startswith("south: ") and says in state.why
+    if "repeats" not in says:  # a wall that comes nearer at once is something, a moment long
+        assert found == []
+    found = bench.run(3.0)
+    (state,) = bench.floor.states().values()
+    assert state.state == "connected" and kinds(found) == []
