@@ -15,7 +15,7 @@ _ACCELERATION, _COAST_S = 0.8, 2.0
 #: A foot stays where it stands within this (m); feet are so far from the body along its way and aside (m).
 _STAND_M, _ALONG_M, _ASIDE_M, _REACH_M = 0.045, 0.4, 0.24, 1.0
 #: While one foot stands, the body is so near it (m); nobody is faster (m/s).
-_TETHER_M, _FAST = 0.33, 2.0
+_TETHER_M, _FAST = 0.22, 2.0
 #: Time for which a new print counts as a fresh step (s).
 _FRESH_S = 1.0
 #: No ankle or shoe is narrower than this (m).

@@ -12,8 +12,11 @@ from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO
 
 Array = NDArray[np.float64]
 
-#: What a scan says of a place: not in view, taken, hidden by something nearer, free.
-UNSEEN, HIT, HIDDEN, FREE, WALLED = 0, 1, 2, 3, 4
+#: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
+UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT = 0, 1, 2, 3, 4, 5
+
+#: Where nothing echoes behind it, a thing is missing when nothing echoes any more, if it did so reliably.
+_RELIABLE = 0.93
 
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
 #: nothing else was seen.
@@ -98,7 +101,7 @@ def look(
                     states[i] == BEYOND
                     or (states[i] == BACKGROUND and r > away - gate)
                     or (states[i] == FOREGROUND and r > away + gate)
-                    or (states[i] == NO_ECHO and empty[i] > 0.5)
+                    or (states[i] == NO_ECHO and empty[i] > 0.5 and thing.rate > _RELIABLE)
                 ):
                     beyond += 1
                 elif states[i] != NO_ECHO and r < away - gate:
@@ -122,6 +125,8 @@ def look(
                 out.verdict = FREE
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
+            elif out.verdict == UNSEEN and beyond == 0:
+                out.verdict = SILENT
 
 
 @njit(cache=True)

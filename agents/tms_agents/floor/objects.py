@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
-from tms_agents.floor.freespace import FREE, HIT
+from tms_agents.floor.freespace import FREE, HIT, SILENT
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -43,6 +43,9 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
                 thing.y += gain * (seen.y - thing.y)
                 thing.half += gain * (0.5 * seen.width - thing.half)
                 thing.var = _SURFACE_VAR + 1e-4 / (thing.hits + 1)
+        elif seen.verdict == SILENT:
+            # Black and glossy things do not always echo.
+            thing.rate -= 0.02 * thing.rate
         elif seen.verdict == FREE:
             # Since the last look by any sensor, but no longer than a scan takes: between them it was hidden.
             thing.free += min(dt, t - thing.free_at, 0.2)
