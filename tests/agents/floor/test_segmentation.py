@@ -1,0 +1,63 @@
+"""Clusters: what belongs together, where it is, and what is only an edge."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from floor_rooms import WALLS, cast, sweep
+
+from tms_agents.floor import Sensor
+from tms_agents.floor.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.rays import rays
+from tms_agents.floor.segmentation import Segmenter
+
+SENSOR = Sensor(sweep(), (0.05, 0.05, math.pi / 4))
+STEP = np.diff(SENSOR.sweep.angles, append=SENSOR.sweep.angles[-1] + 0.003)
+EMPTY = cast(SENSOR, [], WALLS)
+
+
+def clusters(
+    circles: list[tuple[float, float, float]],
+    change: dict[int, float] | None = None,
+    posts: tuple[tuple[float, float, float], ...] = (),
+) -> Any:
+    ranges, empty = cast(SENSOR, [*circles, *posts], WALLS), cast(SENSOR, posts, WALLS)
+    for beam, value in (change or {}).items():
+        ranges[beam] = value
+    states = np.where(ranges < empty - 0.03, FOREGROUND, BACKGROUND).astype(np.int8)
+    segment = Segmenter(np.abs(STEP), math.radians(15.0))
+    return segment(ranges, states, np.zeros(ranges.size, np.bool_), empty, rays(SENSOR, SENSOR.pose, []))
+
+
+def test_a_round_thing_is_one_cluster_at_its_middle() -> None:
+    (cluster,) = clusters([(2.0, 1.5, 0.06)])
+    assert math.hypot(cluster["x"] - 2.0, cluster["y"] - 1.5) < 0.012
+    assert abs(cluster["width"] - 0.12) < 0.025
+    assert not cluster["cut"]
+
+
+def test_two_legs_are_two_clusters_and_one_before_the_other_is_cut() -> None:
+    assert len(clusters([(2.0, 1.5, 0.05), (2.0, 1.8, 0.05)])) == 2
+    near, far = sorted(clusters([(1.5, 1.5, 0.05), (2.5, 2.38, 0.06)]), key=lambda cluster: float(cluster["near"]))
+    assert far["cut"]
+    assert not near["cut"]
+
+
+def test_a_post_before_the_middle_of_a_thing_does_not_split_it() -> None:
+    (cluster,) = clusters([(2.4, 2.4, 0.12)], posts=((1.2, 1.2, 0.012),))
+    assert float(cluster["width"]) > 0.18
+
+
+def test_a_beam_that_saw_a_bit_of_both_sides_of_an_edge_is_dropped() -> None:
+    (cluster,) = clusters([(2.0, 1.5, 0.06)])
+    between = 0.5 * (float(cluster["near"]) + EMPTY[cluster["last"] + 1])
+    assert len(clusters([(2.0, 1.5, 0.06)], {int(cluster["last"]) + 1: between})) == 1
+
+
+def test_nothing_gives_nothing_and_a_missing_beam_does_not_split() -> None:
+    assert len(clusters([])) == 0
+    (cluster,) = clusters([(2.0, 1.5, 0.06)])
+    middle = int(cluster["first"] + cluster["last"]) // 2
+    assert len(clusters([(2.0, 1.5, 0.06)], {middle: float("nan")})) == 1
