@@ -23,8 +23,9 @@ from tms_schemas.observation import (
 
 #: A covariance smaller than this claims more than any installer measures (5 mm).
 _LEAST_VARIANCE = 2.5e-5
-#: One who is this sure to have acted is named, otherwise the server weighs who was near.
-_SURE = 0.9
+#: One who is this sure to have acted is named, or a little less where nobody else comes into question; otherwise the
+#: server weighs who was near.
+_SURE, _ALONE, _NOBODY = 0.9, 0.6, 0.05
 #: How long it is remembered where a mover was, and in how many places at most.
 _REMEMBER_S, _PLACES = 120.0, 600
 #: At rest a mover's place is told once more when it is known better by this.
@@ -216,9 +217,10 @@ class Labels:
 
     def _who(self, candidates: Sequence[tuple[int, float]], t: float) -> str | Near | None:
         """The mover that acted, if that is sure and it was here then; robots are named by where they were."""
-        number, p = max(candidates, key=lambda one: one[1], default=(-1, 0.0))
+        (number, p), (_, next_p) = sorted([*candidates, (-1, 0.0), (-1, 0.0)], key=lambda one: -one[1])[:2]
         mover = self.movers.get(number)
-        if p < _SURE or mover is None or not mover.entered <= t <= mover.left:
+        sure = p >= _SURE or (p >= _ALONE and next_p <= _NOBODY)
+        if not sure or mover is None or not mover.entered <= t <= mover.left:
             return None
         return mover.label or Near(xy=_rounded(mover.at(t)))
 

@@ -98,8 +98,12 @@ def test_a_thing_is_told_for_when_it_was_put_and_by_whom():
     (put,) = floor.observations([thing(9.0, 2, (1.2, 1.0), since=6.0, candidates=((1, 0.95),))])
     assert (at(put), put.source, put.kind, put.size_m) == (pytest.approx(6.0), walker.label, "floor", 0.06)
     assert put.cov[0] >= 2.5e-5, "nobody measures better than that"
-    (unsure,) = floor.observations([thing(10.0, 3, (1.2, 2.0), since=8.0, candidates=((1, 0.7),))])
+    (unsure,) = floor.observations([thing(10.0, 3, (1.2, 2.0), since=8.0, candidates=((1, 0.7), (9, 0.2)))])
     assert unsure.source is None, "the server weighs who was near"
+    (alone,) = floor.observations([thing(10.0, 4, (1.6, 2.0), since=8.0, candidates=((1, 0.7),))])
+    assert alone.source == walker.label
+    (far,) = floor.observations([thing(10.0, 5, (1.6, 2.5), since=8.0, candidates=((1, 0.4),))])
+    assert far.source is None
 
 
 def test_what_was_taken_unseen_is_told_for_when_the_taker_was_there():
