@@ -15,7 +15,7 @@ _ACCELERATION, _COAST_S = 0.8, 2.0
 #: A foot stays where it stands within this (m); feet are so far from the body along its way and aside (m).
 _STAND_M, _ALONG_M, _ASIDE_M, _REACH_M = 0.045, 0.4, 0.24, 1.0
 #: While one foot stands, the body is so near it (m); nobody is faster (m/s).
-_TETHER_M, _FAST = 0.22, 2.0
+_TETHER_M, _FAST = 0.17, 2.0
 #: Time for which a new print counts as a fresh step (s).
 _FRESH_S = 1.0
 #: No ankle or shoe is narrower than this (m).
@@ -331,7 +331,7 @@ def update(
         x, y = (wa * c.x + wb * d.x) / (wa + wb), (wa * c.y + wb * d.y) / (wa + wb)
         # When a foot lands, the body is in the middle; while both stand, it goes on.
         age = min(age_a, age_b)
-        noise = 0.06 if 0.25 < age < 0.8 else 0.01
+        noise = 0.03 if 0.25 < age < 0.8 else 0.015
     else:
         x, y = (c.x, c.y) if has_c else (d.x, d.y)
         age = t - (body.a_since if has_c else body.b_since)

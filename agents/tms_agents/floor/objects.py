@@ -97,7 +97,8 @@ def _ripe(
             elif np.hypot(body.x - q.x, body.y - q.y) < 0.6:
                 third = False
                 break
-        if not alone and not third:
+        # A foot that has just been lifted is no object.
+        if not alone and (not third or t - q.owned < alone_s):
             continue
         if q.width < width_m:
             ripe[j] = 1

@@ -133,6 +133,7 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
             if body.a_print == j or body.b_print == j:
                 q.owner = b
                 q.owned = t
+                q.busy = t
             if body.stale:
                 continue
             d = np.hypot(body.x - q.x, body.y - q.y)
