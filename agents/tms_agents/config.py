@@ -37,7 +37,7 @@ class Server(Section):
     url: str = Field(default=DEFAULT_URL, pattern=r"^https?://\S+$")
     key: str | None = None
     batch: Annotated[int, Field(ge=1, le=1000)] = 500
-    linger_s: Annotated[float, Field(ge=0, le=60)] = 0.1
+    linger_s: Annotated[float, Field(ge=0, le=60)] = 0.02
 
 
 class SpoolSection(Section):

@@ -22,6 +22,9 @@ from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steps import Step
 
+#: So far the sum of the cells sways while it rests.
+_SWAY_G = 5.0
+
 
 @dataclass(slots=True)
 class Settling:
@@ -158,6 +161,7 @@ class Bookkeeper:
             return []  # or another change has come, which was not its
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
+        thing.load = thing.load + _sway(thing)
         if settling.way is not None and settling.placed is not None:
             at, spread = refine(settling.way, settling.placed.tail, thing.load, variance, self._shelf.geometry)
             thing.place(at, spread, self._shelf.geometry)
@@ -181,3 +185,12 @@ class Bookkeeper:
             return []
         thing.told = at.xy
         return [Moved(now, thing.id, at.xy, at.cov)]
+
+
+def _sway(thing: Thing) -> Array | float:
+    """What a thing whose tag tells its weight seems to weigh beside that is mostly a level that sways, (k,) g."""
+    if thing.known is None or thing.joint:
+        return 0.0
+    off, variance = thing.known.mean_g - float(thing.load.sum()), float(thing.variance.sum()) + _SWAY_G**2
+    both = variance + thing.known.sd_g**2
+    return 0.0 if off**2 > 16.0 * both else off * variance / both / len(thing.load)

@@ -43,8 +43,10 @@ _IN_THE_MIDDLE = math.log(1.5)
 _UNKNOWN, _UNLISTED = math.log(1e-3), math.log(5e-3)
 #: How often a thing is slid rather than lifted and put down.
 _SLID = 0.02
-#: More than that never goes with it (share of its weight, g); log-odds of what cannot be.
-_TOO_MUCH, _TOO_MUCH_G, _HOPELESSLY = 1.2, 20.0, -10.0
+#: More than that is never missing (share of the weight, g; of a board that swings); log-odds of what cannot be.
+_TOO_MUCH, _TOO_MUCH_G, _SWING_G, _HOPELESSLY = 1.2, 20.0, 80.0, -10.0
+#: Of what is lifted so much is missing, of what is slid at most so much; log-odds of neither. Blocks that are averaged.
+_OFF, _ON, _NEITHER, _SMOOTH = 0.85, 0.4, -4.0, 3
 
 
 @dataclass(slots=True, eq=False)
@@ -111,7 +113,7 @@ def outcomes(
     ways = [_way(episode, outcome, things, geometry) for outcome in found]
     best = max(ways, default=0.0)
     weighed = [
-        replace(outcome, score=outcome.score - _dampened(best - way) + _lifted(episode, outcome, things))
+        replace(outcome, score=outcome.score - _dampened(best - way) + _lifted(episode, outcome, things, known.shaking))
         for outcome, way in zip(found, ways, strict=True)
     ]
     return _normalised([*weighed, _unexplained(episode, change, spread, known, geometry, best)])
@@ -200,19 +202,20 @@ def _way(episode: Episode, outcome: Outcome, things: Mapping[int, Thing], geomet
     return way_odds(episode.way, loads, geometry, free=len(outcome.new) == 2 or bool(anywhere))
 
 
-def _lifted(episode: Episode, outcome: Outcome, things: Mapping[int, Thing]) -> float:
-    """A thing that is somewhere else now was lifted on the way: its weight was off the board, and no more than that."""
-    if len(outcome.gone) != 1 or len(outcome.new) != 1:
+def _lifted(episode: Episode, outcome: Outcome, things: Mapping[int, Thing], shaking: bool) -> float:
+    """No more is missing on the way than goes or is put elsewhere, and what is put elsewhere was lifted or slid."""
+    if len(episode.way) < _SMOOTH:
         return 0.0
-    (old,) = (things[i] for i in outcome.gone)
-    weight = float(old.load.sum())
     totals = np.array([mean.sum() for mean, _ in episode.way])
-    if old.tag != outcome.new[0] or len(totals) < 3:
-        return 0.0
-    least = float(np.convolve(totals, np.ones(3) / 3, "valid").min())
-    if least < -_TOO_MUCH * weight - _TOO_MUCH_G:
+    least = float(np.convolve(totals, np.ones(_SMOOTH) / _SMOOTH, "valid").min())
+    noise = 3.0 * math.sqrt(float(np.mean([variance.sum() for _, variance in episode.way])) / _SMOOTH)
+    weight = sum(float(things[i].load.sum()) for i in outcome.gone)
+    if least < -_TOO_MUCH * weight - noise - (_SWING_G if shaking else _TOO_MUCH_G):
         return _HOPELESSLY
-    return 0.0 if least < -0.5 * weight else math.log(_SLID)
+    moved = len(outcome.gone) == len(outcome.new) == 1 and things[min(outcome.gone)].tag == outcome.new[0]
+    if not moved or least < -_OFF * weight + noise:
+        return 0.0
+    return math.log(_SLID) if least > -_ON * weight - noise else math.log(_SLID) + _NEITHER
 
 
 def _normalised(found: Sequence[Outcome]) -> list[Outcome]:

@@ -25,6 +25,8 @@ _LOOK_S, _RESTED_S, _RARELY_S, _CLOSED_S = 1.5, 2.5, 4.0, 20.0
 _AGAIN_S = 2.0
 #: Another outcome must be so sure, and what was told so improbable.
 _SURE, _DOUBT = 0.9, 0.05
+#: ... while something shakes the board.
+_SURE_SHAKEN = 0.98
 #: More often than that an episode is not put right: something else speaks against it.
 _MOST_REVISIONS = 2
 #: How long a lifted thing's tag may stay in view in the hand.
@@ -96,7 +98,7 @@ class Hindsight:
             self._settings.creep_per_hour,
         )
         told, best = current(episode, self._shelf), found[0]
-        if not best.known or best.score < _SURE or _same(best, told):
+        if not best.known or best.score < (_SURE_SHAKEN if shaking else _SURE) or _same(best, told):
             return []
         if sum(one.score for one in found if one.known and _same(one, told)) > _DOUBT:
             return []
