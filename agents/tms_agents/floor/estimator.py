@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tms_agents.floor.association import Association
+from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, look
 from tms_agents.floor.furniture import Furniture, Piece
@@ -153,7 +154,7 @@ class FloorEstimator:
             beams = slice(int(clusters["first"][k]), int(clusters["last"][k]) + 1)
             if q["revealed"] == 2:
                 span = np.arange(beams.start, beams.stop)
-                span = span[view.background.states[span] == 3]
+                span = span[(view.background.states[span] == FOREGROUND) & ~view.claimed[span]]
                 view.background.adopt(span, view.ranges[span])
             elif somebodys[k] or (q["hits"] >= 3 and q["hits"] > 0.6 * q["looks"]):
                 view.claimed[beams] = True

@@ -114,7 +114,7 @@ def _review(
             if body.wide > 0.5:
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
-            if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= 3.0:
+            if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= max(3.0, 0.45 * body.hits):
                 actions[b] = _CONFIRM
             continue
         if unseen == 0.0:
