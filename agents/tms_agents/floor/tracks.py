@@ -29,6 +29,8 @@ _QUALITY = 0.3
 _NEW_S = 30.0
 #: What is pushed is left within this (m).
 _PUSHED_M = 2.0
+#: Nobody stands with the feet so far apart (m) for long.
+_ASTRIDE_M = 0.48
 #: Two of them so near each other (m) are one.
 _UNITE_M = 0.45
 #: A mover is told again when it has moved so far (m).
@@ -41,10 +43,13 @@ _OUT_M, _SPEED = 0.5, 0.9
 
 @njit(cache=True)
 def _is_lone(body: Any, t: float) -> bool:
-    """Whether of a person only one thing is seen, which has not moved for some time."""
+    """Whether of a person only one thing is seen, or two too far apart to stand on, unmoved for some time."""
     if body.robot or body.wide > 0.6 or body.width > 0.2:
         return False
     a, b = t - body.a_seen, t - body.b_seen
+    apart = np.hypot(body.ax - body.bx, body.ay - body.by)
+    if max(a, b) < 0.5 and apart > _ASTRIDE_M and t - max(body.a_since, body.b_since) > 1.5:
+        return True
     since = body.a_since if a < b else body.b_since
     return bool(max(a, b) > 1.0 and t - since > 1.0)
 
