@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import signal
 import sys
 from collections.abc import Sequence
@@ -32,10 +31,8 @@ def main(argv: Sequence[str]) -> int:
     )
     parser.add_argument(
         "--laser",
-        action=argparse.BooleanOptionalAction,
-        default=None,
-        help="an emulated laser and its agent see the floor, and nobody walks faster than people do "
-        "(default: at speed 1; faster ones have a floor sensor without device)",
+        action="store_true",
+        help="an emulated laser and its agent see the floor (at speed 1), instead of a floor sensor without device",
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the sensors' noise (default 0)")
     parser.add_argument("--url", help="use this running server instead of starting one")

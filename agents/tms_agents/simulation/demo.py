@@ -30,8 +30,8 @@ from tms_schemas.objects import ObjectFields, ProductIn
 class Plan:
     """How to play: against ``url``, or a server of our own with its data in ``data_dir``.
 
-    ``port``: 0 is a free one; None is the usual one, or a free one where that is taken. ``laser``: whether an emulated
-    laser sees the floor; None: at a speed that it can follow.
+    ``port``: 0 is a free one; None is the usual one, or a free one where that is taken. ``laser``: an emulated
+    laser sees the floor, which can follow people at speed 1.
     """
 
     url: str | None = None
@@ -42,7 +42,7 @@ class Plan:
     weights: bool = False
     once: bool = False
     speed: float = 1.0
-    laser: bool | None = None
+    laser: bool = False
     seed: int = 0
 
 
@@ -65,7 +65,7 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
                     work,
                     seed=plan.seed,
                     speed=plan.speed,
-                    laser=plan.speed <= 1.0 if plan.laser is None else plan.laser,
+                    laser=plan.laser,
                     clock=clock,
                 )
             )

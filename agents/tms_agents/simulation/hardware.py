@@ -114,7 +114,7 @@ def _floor_bench(rng: np.random.Generator) -> FloorBench:
         if error.name is None or error.name.startswith("tms_"):
             raise
         raise CommandError(
-            f'the laser needs {error.name}: pip install "robot-town-tms[slam]", or leave it out (--no-laser)'
+            f'the laser needs {error.name}: pip install "robot-town-tms[slam]", or leave it out'
         ) from error
     return FloorBench(rng)
 
