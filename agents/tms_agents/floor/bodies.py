@@ -21,7 +21,7 @@ _FRESH_S = 1.0
 #: No ankle or shoe is narrower than this (m).
 _FOOT_M = 0.05
 #: Wider than two feet side by side (m): a robot or furniture.
-WIDE_M = 0.33
+WIDE_M = 0.4
 _BROAD_M = 0.45
 #: Of whom two feet were seen at once in this share of so many scans is no robot.
 _TWO_FEET, _PERSON_HITS = 0.2, 80
