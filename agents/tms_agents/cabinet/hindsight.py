@@ -27,6 +27,8 @@ _AGAIN_S = 2.0
 _SURE, _DOUBT = 0.9, 0.05
 #: ... while something shakes the board.
 _SURE_SHAKEN = 0.98
+#: What was told and is so probable is looked at no more once the board rests.
+_CERTAIN = 0.95
 #: More often than that an episode is not put right: something else speaks against it.
 _MOST_REVISIONS = 2
 #: How long a lifted thing's tag may stay in view in the hand.
@@ -44,6 +46,7 @@ class Hindsight:
         self._episode: Episode | None = None
         self._uncertain = False
         self._looked = -math.inf
+        self._sure = False
         self._revisions = 0
 
     def changing(self, block: Block, level: Level) -> None:
@@ -63,7 +66,8 @@ class Hindsight:
     ) -> list[CabinetEvent]:
         """The load rests at ``level``, (k,) g, for some ``seconds``; the last change ended at ``rested``."""
         events: list[CabinetEvent] = []
-        due = seconds >= _LOOK_S and (seconds < _RARELY_S or t - self._looked >= _AGAIN_S)
+        again = not self._sure and t - self._looked >= _AGAIN_S
+        due = seconds >= _LOOK_S and (seconds < _RARELY_S or again)
         if self._episode is not None and due and self._revisions < _MOST_REVISIONS:
             self._looked = t
             events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
@@ -98,9 +102,10 @@ class Hindsight:
             self._settings.creep_per_hour,
         )
         told, best = current(episode, self._shelf), found[0]
-        if not best.known or best.score < (_SURE_SHAKEN if shaking else _SURE) or _same(best, told):
-            return []
-        if sum(one.score for one in found if one.known and _same(one, told)) > _DOUBT:
+        likely = sum(one.score for one in found if one.known and _same(one, told))
+        self._sure = likely > _CERTAIN
+        enough = _SURE_SHAKEN if shaking else _SURE
+        if not best.known or best.score < enough or _same(best, told) or likely > _DOUBT:
             return []
         self._revisions += 1
         return Revision(
