@@ -13,10 +13,12 @@ SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "fuzz_devices.py"
 
 @pytest.fixture(scope="module")
 def fuzzer():
+    sys.path.append(str(SCRIPT.parent))  # for the targets beside it
     spec = importlib.util.spec_from_file_location("fuzz_devices", SCRIPT)
     module = sys.modules["fuzz_devices"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     yield module
+    sys.path.remove(str(SCRIPT.parent))
     del sys.modules["fuzz_devices"]
 
 
