@@ -5,8 +5,9 @@
     python benchmarks/cabinet.py --only events   or position, or speed
     python benchmarks/cabinet.py --look cabinet --seed 3 --changes 200     one world: every miss and false alarm
 
-Simulated boards (`tms_agents.simulation.board`) with known truth. An event is found when it was told before the next
-thing happened, of the right stay, and within 5 cm and thrice what one second of samples must leave unknown.
+Simulated boards (`tms_agents.simulation.board`) with known truth, each asked as the contestant's program asks it.
+An event is found when it was told before the next thing happened, of the right stay, and within 5 cm and thrice what
+one second of samples must leave unknown.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,10 +26,7 @@ from cabinet_position import WEIGHTS_G, Precision, draw, played, precision
 from cabinet_scores import KINDS, Referee, Scores, percentiles
 from cabinet_worlds import SCENES, UNSEEN
 
-from tms_agents.cabinet import KnownWeight
-from tms_agents.simulation.board import BoardWorld
-
-CONTESTANTS: dict[str, Callable[[BoardWorld, dict[str, KnownWeight]], Contestant]] = {
+CONTESTANTS: dict[str, type[Contestant]] = {
     "ours": Ours,
     "laboratory": Laboratory,
 }
@@ -164,8 +162,9 @@ def detail(scores: Scores) -> None:
 
 def judged(job: Job) -> Scores:
     """Play one world to one contestant."""
-    world, household, known = (SCENES | UNSEEN)[job.scene].open(job.seed)
-    contestant = CONTESTANTS[job.contestant](world, known)
+    kind = CONTESTANTS[job.contestant]
+    world, household, known = (SCENES | UNSEEN)[job.scene].open(job.seed, even=kind.even)
+    contestant = kind(world, known)
     referee = Referee(world, contestant)
     for episode in household.live(job.changes):
         referee.judge(episode, list(played(world, contestant, episode.recording)))
@@ -198,9 +197,9 @@ def _spread(values: list[float]) -> str:
 def speed(samples: int) -> None:
     """CPU time of a contestant for a board of four cells at 50 Hz that is in use."""
     print("\n| by | µs per sample | % of one core at 50 Hz |\n|---|---|---|")
-    for name, contestant in CONTESTANTS.items():
-        world, household, known = SCENES["cabinet"].open(0)
-        cabinet = contestant(world, known)
+    for name, kind in CONTESTANTS.items():
+        world, household, known = SCENES["cabinet"].open(0, even=kind.even)
+        cabinet = kind(world, known)
         spent, seen = 0.0, 0
         for episode in household.live(10**6):
             began = time.process_time()

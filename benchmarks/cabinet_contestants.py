@@ -35,6 +35,10 @@ class Detection:
 class Contestant(Protocol):
     #: Its stays are named after tags.
     by_tag: bool
+    #: Its program asks the board at an even pace.
+    even: bool
+
+    def __init__(self, world: BoardWorld, known: dict[str, KnownWeight]) -> None: ...
 
     def load(self, t: float, grams: NDArray[np.float64]) -> list[Detection]: ...
 
@@ -45,7 +49,7 @@ class Contestant(Protocol):
 
 
 class Ours:
-    by_tag = False
+    by_tag, even = False, False
 
     def __init__(self, world: BoardWorld, known: dict[str, KnownWeight]) -> None:
         board = world.parameters
@@ -64,7 +68,7 @@ class Ours:
 
 
 class Laboratory:
-    by_tag = True
+    by_tag, even = True, True
 
     def __init__(self, world: BoardWorld, known: dict[str, KnownWeight]) -> None:
         self._cabinet = LaboratoryCabinet(world.parameters.cells)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from cabinet_contestants import Contestant, Detection
 from cabinet_limits import difference_variance, position_limit, tilted_limit
 
-from tms_agents.cabinet import KnownWeight
 from tms_agents.simulation.board import BoardParameters, BoardWorld, Change, Recording
 from tms_agents.simulation.board_noise import CellParameters
 
@@ -40,12 +39,10 @@ class Precision:
     covered: float
 
 
-def precision(
-    contestant: Callable[[BoardWorld, dict[str, KnownWeight]], Contestant], weight: int, trials: int
-) -> Precision:
+def precision(contestant: type[Contestant], weight: int, trials: int) -> Precision:
     """Put and take a thing of unknown weight again and again, at random places."""
     matter, places = np.random.default_rng(weight).spawn(2)
-    world = BoardWorld(BOARD, matter)
+    world = BoardWorld(replace(BOARD, even=contestant.even), matter)
     cabinet = contestant(world, {})
     _play(world, cabinet, world.run(5.0))
     squares: list[tuple[float, float, float, float, float]] = []

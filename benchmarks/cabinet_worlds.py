@@ -19,10 +19,13 @@ class Scene:
     board: BoardParameters = field(default_factory=BoardParameters)
     life: LifeParameters = field(default_factory=LifeParameters)
 
-    def open(self, seed: int) -> tuple[BoardWorld, Household, dict[str, KnownWeight]]:
-        """A world, who lives there, and what the object database says of the tagged things' weights."""
+    def open(self, seed: int, *, even: bool = False) -> tuple[BoardWorld, Household, dict[str, KnownWeight]]:
+        """A world, who lives there, and what the object database says of the tagged things' weights.
+
+        ``even``: the board is asked at an even pace, not on the beat of our drivers.
+        """
         matter, people, scales = np.random.default_rng(seed).spawn(3)
-        world = BoardWorld(self.board, matter)
+        world = BoardWorld(replace(self.board, even=even), matter)
         household = Household(world, self.life, people)
         known = {}
         for name, tag in household.tags.items():

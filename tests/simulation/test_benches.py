@@ -53,7 +53,7 @@ class Desk:
         """The last samples and tag items are those of this time."""
         self.samples, self.items, end = [], [], self.now + seconds
         while self.now < end:
-            self.now += 0.005
+            self.now += 0.001
             self.board.tick()
             self.reader.tick()
             while sent := self.board.output():

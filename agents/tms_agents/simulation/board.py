@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tms_agents.devices.beat import moment
 from tms_agents.simulation.board_hands import HandParameters, Hands, Trace, Xy, resting
 from tms_agents.simulation.board_noise import CellBank, CellParameters
 from tms_agents.simulation.board_plate import load_shares
@@ -36,6 +37,7 @@ class BoardParameters:
     width: float = 0.465
     depth: float = 0.317
     period_s: float = 0.02
+    even: bool = True  # or on the uneven beat of our drivers, once per period
     electronics: CellParameters = field(default_factory=CellParameters)
     hands: HandParameters = field(default_factory=HandParameters)
     tags: TagParameters = field(default_factory=TagParameters)
@@ -100,7 +102,7 @@ class BoardWorld:
 
     @property
     def time_s(self) -> float:
-        """Time of the last conversion."""
+        """Until when the cells have converted."""
         return self._samples * self.parameters.period_s
 
     @property
@@ -205,8 +207,10 @@ class BoardWorld:
         return loads
 
     def _next_times(self, samples: int) -> Floats:
-        t = (self._samples + 1 + np.arange(samples)) * self.parameters.period_s
-        return np.asarray(t, dtype=np.float64)
+        numbers, period_s = range(self._samples, self._samples + samples), self.parameters.period_s
+        if self.parameters.even:
+            return np.array([(number + 1) * period_s for number in numbers])
+        return np.array([moment(number, period_s) for number in numbers])
 
     def _convert(self, t: Floats, rf_on: NDArray[np.bool_]) -> Floats:
         counts = self.electronics.read(t, self.loads(t), rf_on)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import os
 import socket
 
-import pytest
 from link_listening import QUICK, until
 
-from tms_agents.devices.beat import BEAT_S, on_the_beat
 from tms_agents.devices.outgoing import Outgoing
 from tms_agents.devices.streams import Stream
 from tms_agents.devices.transport import DeviceFault, DeviceState, Link, tcp
@@ -164,15 +161,3 @@ async def test_a_host_that_refuses_is_named_and_tried_again():
         port = server.getsockname()[1]
     seen = await until(Link(tcp("127.0.0.1", port), Echo, name="it", retry=QUICK), lambda seen: bool(seen))
     assert seen[0].state == "faulty" and "Connect call failed" in seen[0].why
-
-
-@pytest.mark.parametrize(
-    ("when", "wait_s", "expected"), [(1.003, 0.019, 1.003), (1.003, 0.02, 1.02), (1.04, 0.1, 1.04)]
-)
-def test_long_waits_end_on_the_beat(when, wait_s, expected):
-    assert math.isclose(on_the_beat(when, wait_s), expected)
-
-
-@pytest.mark.parametrize("number", range(1, 400, 7))
-def test_a_moment_on_the_beat_is_not_put_off(number):
-    assert math.isclose(on_the_beat(number * BEAT_S, 0.1), number * BEAT_S)

@@ -8,10 +8,10 @@ missing cannot be told: a board that does so again and again is a fault.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
+from tms_agents.devices.beat import next_moment
 from tms_agents.devices.lines import LineParser
 from tms_agents.devices.loadboard.session import INDEX, LONGEST_LINE, answer_in, number_in
 from tms_agents.devices.loads import LoadSample
@@ -23,7 +23,8 @@ _MOST_SPOILED = 10
 
 
 class RosTmsBoardBurst(Outgoing):
-    """Delivers a ``LoadSample`` of counts per round, one every ``period_s`` seconds, one round late.
+    """Delivers a ``LoadSample`` of counts per round, one on every beat of ``period_s`` seconds (``devices.beat``), one
+    round late.
 
     ``reply_s``: answers later than this spoil the round; ``quiet_s``: pause after a spoiled one.
 
@@ -84,9 +85,8 @@ class RosTmsBoardBurst(Outgoing):
 
     @property
     def tick_s(self) -> float:
-        """Seconds to the next multiple of the period, so that what else this process does falls together with it."""
         now = self._clock()
-        return (math.floor(now / self._period_s + 1e-3) + 1) * self._period_s - now
+        return next_moment(now, self._period_s) - now
 
     def tick(self) -> None:
         now = self._clock()

@@ -20,6 +20,7 @@ import re
 import time
 from collections.abc import Callable
 
+from tms_agents.devices.beat import next_moment
 from tms_agents.devices.lines import LineParser
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.outgoing import Outgoing
@@ -35,12 +36,13 @@ _MISSES = 3
 #: How fast the slowest answer is forgotten, per answer, and a doubled pause, per round; the longest pause.
 _FORGET, _RELAX = 0.999, 0.998
 _LONGEST_PAUSE_S = 2.0
-#: Shares of a period: how long a line must be quiet after a round at least, how early a timer may ring.
-_LEAST_QUIET, _EARLY = 0.3, 1e-3
+#: Share of a period for which a line must be quiet after a round at least.
+_LEAST_QUIET = 0.3
 
 
 class RosTmsBoardSession(Outgoing):
-    """Delivers a ``LoadSample`` of counts per round, one round every ``period_s`` seconds if the board is fast enough.
+    """Delivers a ``LoadSample`` of counts per round, one round on every beat of ``period_s`` seconds (``devices.beat``)
+    if the board is fast enough.
 
     ``reply_s``: an answer later than this is missing. A cell that misses three in a row is NaN from then on and asked
     every ``retry_s``; ``fault`` names it. Only answers count as signs of life, so a board that gives none is silent for
@@ -138,8 +140,7 @@ class RosTmsBoardSession(Outgoing):
         return self._lines.pending
 
     def _start(self, now: float) -> None:
-        # Rounds begin at multiples of the period, so that what else this process does falls together with them.
-        self._next_round = (math.floor(now / self._period_s + _EARLY) + 1) * self._period_s
+        self._next_round = next_moment(now, self._period_s)
         self._values = [float("nan")] * len(self._values)
         self._round = [
             cell for cell in range(len(self._values)) if self._misses[cell] < _MISSES or now >= self._ask_again[cell]

@@ -11,6 +11,7 @@ from collections.abc import AsyncGenerator, Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tms_agents.devices.beat import next_moment
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.modbus.registers import WeighingMap
 from tms_agents.devices.transport import DeviceFault, DeviceLink, DeviceState
@@ -67,7 +68,7 @@ def modbus_rtu(device: str, baud: int = 9600, *, parity: str = "N", bits: int = 
 
 
 class ModbusLink(DeviceLink[LoadSample]):
-    """Asks one module every ``period_s`` and delivers a ``LoadSample`` for each complete answer.
+    """Asks one module on every beat of ``period_s`` (``devices.beat``); a ``LoadSample`` for each complete answer.
 
     After an answer that did not come within ``reply_s`` it waits as long again before it asks anew: a late answer of
     RTU says not what it answers. A refusal by the module is a fault, with the reason; "busy" is not. ``listen`` raises
@@ -92,7 +93,7 @@ class ModbusLink(DeviceLink[LoadSample]):
         client = self._open(self._reply_s)
         client.set_max_no_responses(1 << 30)  # silence is judged here
         clock = asyncio.get_running_loop().time
-        alive = due = clock()
+        alive = clock()
         try:
             if not await client.connect():
                 raise DeviceFault("cannot be reached")
@@ -109,8 +110,8 @@ class ModbusLink(DeviceLink[LoadSample]):
                     yield state
                 if registers:
                     yield [self._map.decode(registers)]
-                due = max(due + self._period_s, clock())
-                await asyncio.sleep(self._reply_s if registers is None else due - clock())
+                now = clock()
+                await asyncio.sleep(self._reply_s if registers is None else next_moment(now, self._period_s) - now)
         finally:
             client.close()
 

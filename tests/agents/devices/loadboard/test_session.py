@@ -84,7 +84,7 @@ def test_a_late_answer_is_never_given_to_another_cell():
 def test_an_answer_too_late_even_for_the_pause_spoils_its_round_only():
     """The late line shifts the following answers by one cell; the line left over at the end gives it away."""
     wire = Wire(reply_s=0.02, late_s=0.04)
-    wire.run(0.3, lambda: 0.002)
+    wire.run(0.31, lambda: 0.002)
     wire.device.delay_s = 0.0
     hold = iter([0.075])
     samples = wire.run(0.5, lambda: next(hold, 0.002) if wire.session._asked == 1 else 0.002)
