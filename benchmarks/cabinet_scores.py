@@ -254,8 +254,8 @@ class Referee:
     def _likeness(self, change: Change, one: Detection) -> tuple[int, float]:
         """Nearest first; of stays that share one load, which have no place of their own, those with the right tag."""
         tag = next((other.tag for other in self._left if other.kind == "identified" and other.stay == one.stay), None)
-        wrong = self._shared_in(one) and tag is not None and tag != change.tag
-        return (int(wrong), self._distance(change, one))
+        wrong = 0 if tag == change.tag or not self._shared_in(one) else 1 if tag is None else 2
+        return (wrong, self._distance(change, one))
 
     def _shared_in(self, one: Detection) -> bool:
         return one.stay in self._shared

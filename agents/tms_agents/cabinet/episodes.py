@@ -34,7 +34,7 @@ _SHAKEN, _SHAKEN_G = 0.4, 9.0
 #: Outcomes so much less probable by tags alone than the best one are not weighed, nor more than so many.
 _HOPELESS, _MOST, _MOST_PATHS = 25.0, 250, 12
 #: Blocks of the way that are kept, and the most that a misfit of it counts (log-odds).
-_WAY_BLOCKS, _MOST_ODDS = 600, 3.0
+_WAY_BLOCKS, _MOST_ODDS = 600, 4.5
 #: The least weight of a thing, and how many of its standard deviations it must be.
 _LEAST_G, _CLEAR = 14.0, 2.0
 #: The centre of two is somewhere in the middle rather than anywhere (log density).

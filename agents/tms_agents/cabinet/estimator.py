@@ -18,6 +18,7 @@ from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
 from tms_agents.cabinet.hindsight import Hindsight
 from tms_agents.cabinet.naming import Namer
 from tms_agents.cabinet.noise import Noise
+from tms_agents.cabinet.plateau import Plateau, fits_none
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
@@ -34,6 +35,8 @@ _BALANCE_S, _CORRECT_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 4.0, 0.9, 0.8
 _HEARD = 2
 #: Several at once are believed only at a level that is no pause between them.
 _SEVERAL_S = 0.7
+#: How long it must be steady before what is not simple is decided by all that happened since the last rest.
+_VERDICT_S = 1.5
 #: What may be a part of several things that are being put must stay so for so long to be believed.
 _PART_S = 3.0
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
@@ -69,6 +72,7 @@ class CabinetEstimator:
         self._interrupted: float | None = None
         self._looked = -math.inf
         self._rested = -math.inf
+        self._plateau = Plateau()
 
     def _connect(self) -> None:
         self._book = Bookkeeper(self._shelf, self._settings)
@@ -198,7 +202,7 @@ class CabinetEstimator:
         if self._blocks.frozen(step.settled):
             self._detector.ignore(step) if final else self._detector.hold(step)
             return []
-        steady = step.now - step.settled
+        steady = step.now - self._plateau.since(step)
         waited = math.inf if final else steady
         whole = self._whole(step)
         evidence = self._evidence(step)
@@ -227,10 +231,18 @@ class CabinetEstimator:
             else:
                 self._detector.accept(step)
             return []
+        odd = fits_none(best, step, self._namer.loose())
+        if self._settings.knows_places and (odd or (best.several and best.kind != "slide")):
+            if waited < self._settings.stubborn_s:
+                return self._by_verdict(step)
+            if steady < _VERDICT_S:
+                self._detector.ignore(step)
+                return []
         arm = self._may_be_an_arm(step, best)
         patience = self._settings.stubborn_s if arm else self._settings.patience_s
-        unsure = arm or self._unclear(step, best) or self._looks_pressed(step, best, waited)
-        part = self._may_be_a_part(best, step)
+        unsure = arm or self._unclear(step, best) or (odd and not _PASSING_S < waited < math.inf)
+        # Several tags are new: one thing has come, and another is on its way.
+        part = odd and len(self._namer.loose()) > 1
         if (unsure and waited < patience) or (part and waited < _PART_S):
             self._detector.hold(step)
             return []
@@ -240,6 +252,18 @@ class CabinetEstimator:
         if best.kind == "slide":
             self._book.doubt(step, best, others)
         return self._take(step, best)
+
+    def _by_verdict(self, step: Step) -> list[CabinetEvent]:
+        """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
+        waited = step.now - self._plateau.since(step)
+        outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if waited >= _VERDICT_S else None
+        if outcome is None:
+            self._detector.hold(step)
+            return []
+        self._detector.accept(step)
+        self._rested, self._book.settling = step.settled, None
+        events = self._hindsight.tell(outcome, step.now)
+        return events + self._namer.update(step.now, resting=self._detector.resting)
 
     def _whole(self, step: Step) -> Step | None:
         """All that the stays and the zeros leave unexplained after ``step``, not only what is new."""
@@ -266,26 +290,6 @@ class CabinetEstimator:
         if best.kind not in ("put", "two") or self._namer.loose():
             return False
         return step.now - step.settled < self._settings.untagged_s or step.restless > self._settings.restless
-
-    def _looks_pressed(self, step: Step, best: Explanation, waited: float) -> bool:
-        """A thing that must be one of some known weights, and is of none of them: a hand still holds it."""
-        return self._fits_none(best, step, self._namer.loose()) and not _PASSING_S < waited < math.inf
-
-    def _may_be_a_part(self, best: Explanation, step: Step) -> bool:
-        """Several tags are new and the weight is of none of their things: one has come, and another is on its way."""
-        loose = self._namer.loose()
-        return len(loose) > 1 and self._fits_none(best, step, loose)
-
-    @staticmethod
-    def _fits_none(best: Explanation, step: Step, loose: Mapping[str, KnownWeight | None]) -> bool:
-        if best.load is None or best.kind not in ("put", "swap") or None in loose.values() or not loose:
-            return False
-        weight, sd = float(best.load.sum()), math.sqrt(float(step.variance.sum()))
-        return not any(
-            abs(weight - known.mean_g) < 4 * math.hypot(sd, known.sd_g) + 2.0
-            for known in loose.values()
-            if known is not None
-        )
 
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         self._detector.accept(step)

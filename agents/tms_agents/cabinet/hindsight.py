@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.revising import Revision, current, order
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
+from tms_agents.cabinet.steps import Step
 
 #: An episode is looked at when the board has rested so long; the next one begins after so long a rest; later the last
 #: one is looked at less often, and after so long a rest no more.
@@ -25,16 +27,22 @@ _LOOK_S, _RESTED_S, _RARELY_S, _CLOSED_S = 1.5, 2.5, 4.0, 20.0
 _AGAIN_S = 2.0
 #: Another outcome must be so sure, and what was told so improbable.
 _SURE, _DOUBT = 0.9, 0.05
-#: ... while something shakes the board.
-_SURE_SHAKEN = 0.98
+#: ... while something shakes the board, and before anything else was told.
+_SURE_SHAKEN, _SURE_AT_ONCE = 0.98, 0.85
 #: What was told and is so probable is looked at no more once the board rests.
 _CERTAIN = 0.95
+#: How much more probable an outcome is that was told step by step.
+_TOLD = 8.0
 #: More often than that an episode is not put right: something else speaks against it.
 _MOST_REVISIONS = 2
 #: How long a lifted thing's tag may stay in view in the hand.
 _IN_HAND_S = 0.8
+#: So long before the load changes the tag of what is brought may come into view.
+_BROUGHT_S = 3.0
 #: Rounds go wrong in ways of their own: no tag's evidence counts more than this.
 _MOST_ODDS = 12.0
+
+Told = tuple[frozenset[int], tuple[str | None, ...]]
 
 
 class Hindsight:
@@ -80,14 +88,52 @@ class Hindsight:
             self._episode = None
         return events
 
+    def verdict(self, step: Step, *, shaking: bool) -> Outcome | None:
+        """What has happened up to the steady load of ``step``, where that is sure."""
+        if self._episode is None:
+            return None
+        level, variance = step.before + step.change, step.variance - step.before_variance
+        best = self._outcomes(self._episode, step.now, level, variance, step.settled, shaking or self._uncertain)[0]
+        return best if best.known and best.score >= _SURE_AT_ONCE else None
+
+    def tell(self, outcome: Outcome, t: float) -> list[CabinetEvent]:
+        """Make the shelf what a verdict says."""
+        assert self._episode is not None
+        return self._revision(self._episode, outcome, t).events()
+
     def _revise(
         self, episode: Episode, t: float, level: Array, variance: Array, rested: float, shaking: bool
     ) -> list[CabinetEvent]:
+        told = current(episode, self._shelf)
+        found = _trusting(self._outcomes(episode, t, level, variance, rested, shaking), told)
+        best = found[0]
+        likely = sum(one.score for one in found if one.known and _same(one, told))
+        self._sure = likely > _CERTAIN
+        enough = _SURE_SHAKEN if shaking else _SURE
+        if not best.known or best.score < enough or _same(best, told) or likely > _DOUBT:
+            return []
+        self._revisions += 1
+        return self._revision(episode, best, t).events()
+
+    def _revision(self, episode: Episode, outcome: Outcome, t: float) -> Revision:
+        return Revision(
+            self._shelf,
+            episode,
+            outcome,
+            t,
+            pin=self._namer.pin,
+            left=lambda thing: self._left(thing, t),
+            weight=self._namer.weight,
+        )
+
+    def _outcomes(
+        self, episode: Episode, t: float, level: Array, variance: Array, rested: float, shaking: bool
+    ) -> list[Outcome]:
         things = self._shelf.things
         for thing in episode.things:
             if thing.id in things:
                 thing.tag = things[thing.id].tag
-        found = outcomes(
+        return outcomes(
             episode,
             t,
             level,
@@ -97,26 +143,11 @@ class Hindsight:
                 lambda tag: self._odds(tag, rested + _IN_HAND_S),
                 self._namer.weight,
                 shaking,
+                self._namer.fresh(episode.onset - _BROUGHT_S),
             ),
             self._shelf.geometry,
             self._settings.creep_per_hour,
         )
-        told, best = current(episode, self._shelf), found[0]
-        likely = sum(one.score for one in found if one.known and _same(one, told))
-        self._sure = likely > _CERTAIN
-        enough = _SURE_SHAKEN if shaking else _SURE
-        if not best.known or best.score < enough or _same(best, told) or likely > _DOUBT:
-            return []
-        self._revisions += 1
-        return Revision(
-            self._shelf,
-            episode,
-            best,
-            t,
-            pin=self._namer.pin,
-            left=lambda thing: self._left(thing, t),
-            weight=self._namer.weight,
-        ).events()
 
     def _odds(self, tag: str, since: float) -> tuple[float, float]:
         hit, false = self._settings.read_probability, self._settings.false_read_probability
@@ -130,5 +161,13 @@ class Hindsight:
         self._namer.left(thing, t, at.weight_g, at.weight_sd_g)
 
 
-def _same(outcome: Outcome, told: tuple[frozenset[int], tuple[str | None, ...]]) -> bool:
+def _trusting(found: Sequence[Outcome], told: Told) -> list[Outcome]:
+    """The same, with what was told step by step more probable: each step was explained by what the load was then."""
+    weights = [one.score * (_TOLD if one.known and _same(one, told) else 1.0) for one in found]
+    total = sum(weights)
+    trusted = [replace(one, score=weight / total) for one, weight in zip(found, weights, strict=True)]
+    return sorted(trusted, key=lambda one: -one.score)
+
+
+def _same(outcome: Outcome, told: Told) -> bool:
     return (outcome.gone, order(outcome.new)) == told

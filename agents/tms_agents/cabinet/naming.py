@@ -47,6 +47,10 @@ class Namer:
         """The present tags that are at no stay, with what is known of their weights: what may be put next."""
         return {tag: self.weight(tag) for tag in self._loose}
 
+    def fresh(self, since: float) -> set[str]:
+        """The present tags that are at no stay and came into view after a time."""
+        return {tag for tag, first in self._loose.items() if first > since}
+
     def update(self, now: float, *, resting: bool) -> list[CabinetEvent]:
         """Look at tags and stays together; called after every round and every event of the load.
 

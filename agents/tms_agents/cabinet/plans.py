@@ -19,6 +19,8 @@ _NOTHING = math.log(0.5)
 _ASIDE = math.log(0.03)
 #: A new thing has a tag or none. A tag in view may belong to something else, or be in the hand that took its thing.
 _TAGGED, _UNTAGGED, _ELSEWHERE, _IN_HAND = math.log(0.8), math.log(0.2), math.log(0.03), math.log(0.2)
+#: ... hardly to something else if it came into view together with the change.
+_CAME_ELSEWHERE = math.log(0.004)
 #: Up to so many things go at once, fewer where there are many.
 _MOST_GONE, _FEWER_GONE, _MANY = 3, 2, 10
 
@@ -35,6 +37,8 @@ class Known:
     weight: Callable[[str], KnownWeight | None]
     #: Something shakes the board, so that its level may swing.
     shaking: bool = False
+    #: Tags that came into view together with the change.
+    fresh: Collection[str] = ()
 
 
 class Plan(NamedTuple):
@@ -50,9 +54,11 @@ def plans_of(things: Sequence[Thing], known: Known) -> Iterator[Plan]:
     own = {thing.tag for thing in things if thing.tag is not None}
     odds = {tag: known.odds(tag) for tag in sorted(own.union(known.tags))}
     free = [tag for tag in odds if tag not in own]
-    astray = {
-        tag: max(absent, (_IN_HAND if tag in own else _ELSEWHERE) + present) for tag, (present, absent) in odds.items()
-    }
+
+    def elsewhere(tag: str) -> float:
+        return _IN_HAND if tag in own else _CAME_ELSEWHERE if tag in known.fresh else _ELSEWHERE
+
+    astray = {tag: max(absent, elsewhere(tag) + present) for tag, (present, absent) in odds.items()}
     unmoved = sum(odds[tag][0] for tag in sorted(own)) + sum(astray[tag] for tag in free)
     most = min(_MOST_GONE if len(things) <= _MANY else _FEWER_GONE, len(things))
     for group in itertools.chain.from_iterable(itertools.combinations(things, n) for n in range(most + 1)):

@@ -41,4 +41,6 @@ def way_odds(way: Sequence[tuple[Array, Array]], loads: Sequence[Array], geometr
         _, vectors = np.linalg.eigh(scaled.T @ scaled)
         scaled = scaled - np.outer(scaled @ vectors[:, -1], vectors[:, -1])
         rank += _FREE
-    return -0.5 * WAY * (misfit(scaled, pulls, _CAP) + rank * len(path))
+    # A direction that is free takes up what noise there is, not what a hand might have added.
+    noise = float((variances.sum(axis=1) / (sd**2).sum(axis=1)).sum())
+    return -0.5 * WAY * (misfit(scaled, pulls, _CAP) + rank * noise)
