@@ -100,6 +100,37 @@ def test_two_things_are_put_at_once() -> None:
         assert np.hypot(places["B"][0] - 0.35, places["B"][1] - 0.2) < 0.05
 
 
+def test_a_load_too_heavy_for_its_tag_is_two_things() -> None:
+    """The tag's thing weighs 300 g and 440 g have come: something without a tag is beside it, nobody knows where."""
+    bench = Bench(seed=19, known={"A": KnownWeight(300, 4)})
+    bench.change(900 * share(0.2, 0.2), rest=6.0)
+    bench.tags = frozenset({"A"})
+    first, second = 300 * share(0.1, 0.1), 140 * share(0.35, 0.2)
+    events = bench.run(1.0, lambda s: first * min(s / 0.4, 1) + second * np.clip((s - 0.3) / 0.4, 0, 1))
+    bench.load = bench.load + first + second
+    events += bench.run(5.0)
+    assert len(of(Appeared, events)) == 2 and not of(Vanished, events)
+    (together,) = of(LoadChanged, events)
+    new = {stay.id: stay for stay in bench.estimator.stays() if stay.id in together.stays}
+    assert sorted((stay.tag or "", round(stay.weight_g, -1)) for stay in new.values()) == [("", 140), ("A", 300)]
+    # What goes tells which it was, and where the other one stands.
+    (vanished,) = of(Vanished, bench.change(-140 * share(0.35, 0.2), 0.3))
+    assert new[vanished.stay].tag is None
+    (stay,) = [stay for stay in bench.estimator.stays() if stay.tag == "A"]
+    assert np.hypot(stay.xy[0] - 0.1, stay.xy[1] - 0.1) < 0.03
+
+
+def test_a_part_of_a_thing_is_not_told_while_the_rest_of_it_is_on_its_way() -> None:
+    bench = Bench(seed=20, known={"A": KnownWeight(500, 5), "B": KnownWeight(200, 3)})
+    bench.tags = frozenset({"A", "B"})
+    slow, quick = 500 * share(0.1, 0.1), 200 * share(0.35, 0.2)
+    # A slow hand rests with 60 % of the weight on the board while somebody else puts a thing beside.
+    bench.change(0.6 * slow + quick, 0.5, rest=1.0)
+    bench.change(0.4 * slow, 0.5, rest=5.0)
+    assert len(of(Appeared, bench.events)) == 2 and not of(Vanished, bench.events)
+    assert {(one.tag, round(one.weight_g, -1)) for one in bench.estimator.stays()} == {("A", 500), ("B", 200)}
+
+
 def test_a_slid_thing_keeps_its_stay_and_a_lifted_one_gets_a_new_one() -> None:
     bench = Bench(seed=17)
     bench.tags = frozenset({"T1"})
