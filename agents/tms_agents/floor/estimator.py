@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.events import FloorEvent, FloorLabel
-from tms_agents.floor.freespace import LOOK, look
+from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Masks
@@ -158,6 +158,7 @@ class FloorEstimator:
                 view.background.adopt(span, view.ranges[span])
             elif somebodys[k] or (q["hits"] >= 3 and q["hits"] > 0.6 * q["looks"]):
                 view.claimed[beams] = True
+        guard(view.background.states, view.claimed)
 
     def _new_label(self) -> int:
         self._labels += 1

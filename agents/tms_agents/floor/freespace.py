@@ -18,6 +18,11 @@ UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT = 0, 1, 2, 3, 4, 5
 #: Where nothing echoes behind it, a thing is missing when nothing echoes any more, if it did so reliably.
 _RELIABLE = 0.93
 
+#: A surface goes on so smoothly from beam to beam (m, and per metre of range); no object is wider than this (m).
+_SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
+
+#: So many beams beside a thing do not show the background alone.
+_GUARD = 2
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
 #: nothing else was seen.
 LOOK = np.dtype(
@@ -35,6 +40,16 @@ def beam_of(bearing: float, first: float, step: float, n: int) -> float:
     if index < -0.5 or index > n - 0.5:
         return float(np.nan)
     return index
+
+
+@njit(cache=True)
+def _cut(ranges: Array, a: int, b: int) -> bool:
+    """Whether something nearer hides what may lie on beyond the beams a to b."""
+    for edge, side in ((a, -1), (b, 1)):
+        for i in (edge + side, edge + 2 * side):
+            if 0 <= i < ranges.size and ranges[i] < ranges[edge] - 0.05:
+                return True
+    return False
 
 
 @njit(cache=True)
@@ -78,13 +93,13 @@ def look(
             hits, beyond, hidden, total, alien = 0, 0, 0, 0, 0
             x, y = 0.0, 0.0
             a, b = -1, -1
+            o = 4 if v > 0 else 0
             for i in range(low, high + 1):
                 mirrored = away > rays[i, 8]
                 if mirrored != (v > 0) or (mirrored and int(rays[i, 9]) != v - 1):
                     continue
                 r = ranges[i]
                 if states[i] == FOREGROUND and abs(r - away) <= gate:
-                    o = 4 if mirrored else 0
                     x += rays[i, o] + r * rays[i, o + 2]
                     y += rays[i, o + 1] + r * rays[i, o + 3]
                     claimed[i] = True
@@ -109,16 +124,30 @@ def look(
             if total == 0:
                 continue
             if hits > 0:
+                # More of it than was thought: hidden when it was first seen.
+                wide = int(_WIDEST_M / (away * abs(step)))
+                for side in (-1, 1):
+                    i = b if side > 0 else a
+                    while 0 <= i + side < n and b - a + 1 < wide:
+                        i += side
+                        r = ranges[i]
+                        known = claimed[i] or (r > rays[i, 8]) != (v > 0)
+                        if states[i] != FOREGROUND or known or abs(r - ranges[i - side]) > _SMOOTH_M + _SMOOTH * r:
+                            break
+                        x += rays[i, o] + r * rays[i, o + 2]
+                        y += rays[i, o + 1] + r * rays[i, o + 3]
+                        claimed[i] = True
+                        hits += 1
+                        a, b = min(a, i), max(b, i)
                 out.verdict = HIT
                 out.n = hits
                 out.spacing = away * abs(step)
-                out.width = hits * out.spacing
+                out.width = (b - a + 1) * out.spacing
                 shift = 0.37 * min(out.width, 0.5)
                 m = (a + b) // 2
-                o = 4 if v > 0 else 0
                 out.x = x / hits + shift * rays[m, o + 2]
                 out.y = y / hits + shift * rays[m, o + 3]
-                out.clean = 1 if alien == 0 and b - a + 1 == hits else 0
+                out.clean = 1 if alien == 0 and b - a + 1 == hits and not _cut(ranges, a, b) else 0
                 break
             if 2 * beyond >= total and hidden == 0:
                 # Another way, by a mirror, may still show it.
@@ -127,6 +156,20 @@ def look(
                 out.verdict = HIDDEN
             elif out.verdict == UNSEEN and beyond == 0:
                 out.verdict = SILENT
+
+
+@njit(cache=True)
+def guard(states: NDArray[np.int8], claimed: NDArray[np.bool_]) -> None:
+    """Extend ``claimed`` (n,) to the background beside it: at the edge of a thing before a wall a beam shows both."""
+    n = states.size
+    edge = -9
+    for i in range(n):
+        if claimed[i] and states[i] == FOREGROUND:
+            for k in range(max(i - _GUARD, 0), i):
+                claimed[k] |= states[k] == BACKGROUND
+            edge = i
+        elif i - edge <= _GUARD and states[i] == BACKGROUND:
+            claimed[i] = True
 
 
 @njit(cache=True)

@@ -13,29 +13,45 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free.
-_PUSHED_M, _PUSHED_S = 1.3, 40.0
+_PUSHED_M, _PUSHED_S = 1.3, 15.0
 #: A thin piece (m), like the leg of a chair, tells only together with another so near it (m) that went so soon (s).
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
+#: The ranges of one surface differ so little from beam to beam (m).
+_SAME_M = 0.05
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
 _GONE_S, _WEIGHT = 0.8, 0.12
 
 
 @dataclass(slots=True)
 class Piece:
-    """A piece of the background that is not there now: where it was, ``width`` m wide, and when it went."""
+    """A piece of the background that is not there now: where it was, ``width`` m wide, and when it went.
+
+    ``whole``: nothing of its surface is still there, or hidden.
+    """
 
     t: float
     x: float
     y: float
     width: float
+    whole: float
+
+
+@njit(cache=True)
+def _goes_on(centre: Array, weight: Array, i: int, r: float) -> bool:
+    """Whether the background of beam i has a surface at the range r."""
+    if 0 <= i < centre.shape[0]:
+        for j in range(centre.shape[1]):
+            if weight[i, j] > _WEIGHT and abs(centre[i, j] - r) < _SAME_M:
+                return True
+    return False
 
 
 @njit(cache=True)
 def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: float, t: float, out: Array) -> int:
-    """Group missing components of neighbouring beams to rows of ``out`` (m, 4): t, x, y, width; how many."""
+    """Group missing components of neighbouring beams to rows of ``out`` (m, 5), as `Piece`; how many."""
     n, k = centre.shape
     count = 0
-    last, last_r = -10, 0.0
+    last, last_r, first_r = -10, 0.0, 0.0
     first, x, y, r_sum, beams, gone = 0, 0.0, 0.0, 0.0, 0, 0.0
     for i in range(n + 1):
         r, seconds = 0.0, 0.0
@@ -49,11 +65,13 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
                 out[count, 0] = t - gone / beams
                 out[count, 1], out[count, 2] = x / beams, y / beams
                 out[count, 3] = (last - first + 1) * step * r_sum / beams
+                more = _goes_on(centre, weight, first - 1, first_r) or _goes_on(centre, weight, last + 1, last_r)
+                out[count, 4] = 0.0 if more else 1.0
                 count += 1
             beams = 0
         if r > 0.0:
             if beams == 0:
-                first, x, y, r_sum, gone = i, 0.0, 0.0, 0.0, 0.0
+                first, first_r, x, y, r_sum, gone = i, r, 0.0, 0.0, 0.0, 0.0
             x += rays[i, 0] + r * rays[i, 2]
             y += rays[i, 1] + r * rays[i, 3]
             r_sum += r
@@ -69,7 +87,7 @@ class Furniture:
     def __init__(self) -> None:
         #: Where pieces were that are found again: t, x, y.
         self._found: list[tuple[float, float, float]] = []
-        self._rows = np.zeros((128, 4))
+        self._rows = np.zeros((128, 5))
 
     def pieces(self, view: Any, t: float) -> list[Piece]:
         """What has gone from the background of the sensor."""
@@ -80,8 +98,8 @@ class Furniture:
     def explains(self, print_: Any, pieces: list[Piece], t: float) -> bool:
         """Whether the print is a piece of furniture that has gone from somewhere near; each piece explains one."""
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
-        near = [p for p in pieces if math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
-        near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0 and p.t > t - 3 * _PUSHED_S]
+        near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
+        near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0 and print_["first"] - p.t < _PUSHED_S]
         best, best_cost = None, 1.0
         width = float(print_["width"])
         for piece in near:

@@ -19,8 +19,16 @@ Array = NDArray[np.float64]
 _ARM_M, _FAR_M = 0.5, 1.6
 #: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
 _SURE, _PER_SCAN = 9.0, 1.5
+#: One look is off by this at most (m).
+_TRUST_M = 0.04
 #: Surfaces lie this uncertain behind what is seen (m²).
 _SURFACE_VAR = 0.006**2
+
+
+@njit(cache=True)
+def _within(difference: float) -> float:
+    """At most so much: somebody's foot beside a thing looks like a part of it."""
+    return min(max(difference, -_TRUST_M), _TRUST_M)
 
 
 @njit(cache=True)
@@ -36,12 +44,12 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
             thing.rate += 0.02 * (1.0 - thing.rate)
             thing.free = 0.0
             thing.doubt = max(0.0, thing.doubt - 3.0)
-            if seen.clean and abs(seen.width - 2.0 * thing.half) < 0.5 * thing.half + 1.6 * seen.spacing:
+            if seen.clean:
                 thing.hits += 1
                 gain = max(1.0 / (thing.hits + 1), 0.01)
-                thing.x += gain * (seen.x - thing.x)
-                thing.y += gain * (seen.y - thing.y)
-                thing.half += gain * (0.5 * seen.width - thing.half)
+                thing.x += gain * _within(seen.x - thing.x)
+                thing.y += gain * _within(seen.y - thing.y)
+                thing.half += gain * _within(0.5 * seen.width - thing.half)
                 thing.var = _SURFACE_VAR + 1e-4 / (thing.hits + 1)
         elif seen.verdict == SILENT:
             # Black and glossy things do not always echo.

@@ -108,7 +108,8 @@ def follow(
         if t - q.last > _HIDDEN_S:
             q.used = 0
         elif clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step) == FREE:
-            q.looks += 1
+            if sensor == q.sensor:
+                q.looks += 1
             if t - q.last > _GONE_S:
                 q.used = 0
 

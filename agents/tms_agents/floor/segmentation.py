@@ -36,7 +36,7 @@ _DEPTH = 0.37
 #: A jump between surfaces (m); the parts of one thing behind a thin post are at most so far apart (m, beams).
 _EDGE_M, _HIDDEN_M, _BRIDGE = 0.08, 0.15, 40
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
-_SMOOTH_M, _SMOOTH_PER_M = 0.01, 0.006
+_SMOOTH_M, _SMOOTH_PER_M = 0.006, 0.002
 
 
 @njit(cache=True)
