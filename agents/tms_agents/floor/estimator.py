@@ -17,6 +17,7 @@ from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Masks
 from tms_agents.floor.objects import Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
+from tms_agents.floor.putting import set_aside
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.tracks import Tracks
@@ -107,7 +108,9 @@ class FloorEstimator:
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
-        somebodys = self._association.step(clusters, of, prints, t, view.sight)
+        feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
+        somebodys = np.zeros(clusters.size, np.bool_)
+        somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], prints, t, view.sight)
         attend(prints, bodies, t)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
             for other in self._views.values():

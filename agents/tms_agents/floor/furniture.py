@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free.
-_PUSHED_M, _PUSHED_S = 1.3, 15.0
+#: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free, and so long if
+#: it is one piece. Its width is then the same within this (m) and as far as the beams tell.
+_PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 #: A thin piece (m), like the leg of a chair, tells only together with another so near it (m) that went so soon (s).
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 #: The ranges of one surface differ so little from beam to beam (m).
@@ -99,15 +100,20 @@ class Furniture:
         """Whether the print is a piece of furniture that has gone from somewhere near; each piece explains one."""
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
-        near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0 and print_["first"] - p.t < _PUSHED_S]
+        near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0]
         best, best_cost = None, 1.0
-        width = float(print_["width"])
+        width, spacing = float(print_["width"]), float(print_["spacing"])
         for piece in near:
             if any(math.hypot(piece.x - x, piece.y - y) < 0.05 for _, x, y in self._found):
                 continue
-            difference = abs(piece.width - width) / (0.025 + 0.4 * max(piece.width, width))
+            thin = width < _THIN_M
+            if print_["first"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
+                thin and not self._grouped(piece, pieces)
+            ):
+                continue
+            difference = abs(piece.width - width) / (_WIDTH_M + 0.15 * max(piece.width, width) + spacing)
             cost = 0.3 * math.hypot(piece.x - print_["x"], piece.y - print_["y"]) / _PUSHED_M + 0.7 * difference
-            if difference < 1.0 and cost < best_cost and (width > _THIN_M or self._grouped(piece, pieces)):
+            if difference < 1.0 and cost < best_cost:
                 best, best_cost = piece, cost
         if best is None:
             return False

@@ -106,7 +106,8 @@ def _ripe(
                 third = False
                 break
         # A foot that has just been lifted is no object.
-        if not alone and (not third or t - q.owned < alone_s):
+        given = q.given == 1 and age > 1.25 * rest_s
+        if not alone and not given and (not third or t - q.owned < alone_s):
             continue
         if q.width < width_m:
             ripe[j] = 1

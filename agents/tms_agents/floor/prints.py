@@ -76,7 +76,7 @@ def follow(
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last = t
             q.attached = c.attached
-            q.owner, q.owned, q.busy, q.revealed = -1, -1e9, -1e9, 0
+            q.owner, q.owned, q.busy, q.revealed, q.given = -1, -1e9, -1e9, 0, 0
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:

@@ -31,6 +31,7 @@ PRINT = np.dtype(
         ("owned", "f8"),
         ("busy", "f8"),
         ("revealed", "i8"),
+        ("given", "i8"),
         ("sensor", "i8"),
         ("first_beam", "i8"),
         ("last_beam", "i8"),
