@@ -137,6 +137,8 @@ class FloorEstimator:
     def _settle(self, index: int, t: float, *, is_object: bool) -> list[FloorEvent]:
         """A print rests: it is an object or furniture."""
         q = self._prints[index]
+        if self._masks.outside(float(q["x"]), float(q["y"])):
+            return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s
         if not is_object or known or self._furniture.explains(q, self._pieces(t), t):

@@ -92,3 +92,7 @@ class Masks:
         if not self._any:
             return clusters
         return clusters[: _wanted(clusters, self._region, self._masks, self._sizes, self.MARGIN_M)]
+
+    def outside(self, x: float, y: float) -> bool:
+        """Whether (x, y) is not in the region: nothing lies there that concerns anybody."""
+        return self._region.size > 0 and not inside(self._region, x, y)

@@ -12,8 +12,9 @@ from tms_agents.floor.segmentation import CLUSTER
 
 #: Feet stand when their prints are so old (s); a print is new for so long (s).
 _STANDS_S, _NEW_S = 0.4, 0.15
-#: A hand reaches so far from the middle between the feet (m), a foot so far from where the other stands.
-_REACH_M, _BESIDE_M = 0.85, 0.13
+#: A hand puts things between these distances from the middle between the feet (m): nearer is a step; and so far off
+#: either foot.
+_STEP_M, _REACH_M, _BESIDE_M = 0.3, 0.85, 0.16
 #: Somebody else so near (m) may have stepped there.
 _OTHER_M = 1.0
 
@@ -39,7 +40,7 @@ def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
         )
         if stands and away < _REACH_M:
             near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
-            if near < _BESIDE_M + 0.5 * print_.width:
+            if away < _STEP_M or near < _BESIDE_M + 0.5 * print_.width:
                 return False
             giver = b
         elif away < _OTHER_M:
