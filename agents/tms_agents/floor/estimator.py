@@ -18,6 +18,7 @@ from tms_agents.floor.masks import Masks
 from tms_agents.floor.objects import Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import set_aside
+from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.tracks import Tracks
@@ -49,6 +50,7 @@ class FloorEstimator:
         self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
+        self._robots = sizes(self._scene.robots)
         self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
@@ -106,11 +108,14 @@ class FloorEstimator:
             self._looks,
         )
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
+        clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
         somebodys = np.zeros(clusters.size, np.bool_)
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], prints, t, view.sight)
+        if recognize(bodies, *self._robots):
+            self._association.decide()
         attend(prints, bodies, t)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
             for other in self._views.values():

@@ -46,6 +46,7 @@ BODY = np.dtype(
         ("confirmed", "i8"),
         ("label", "i8"),
         ("robot", "i8"),
+        ("machine", "i8"),
         ("stale", "i8"),
         ("x", "f8"),
         ("y", "f8"),

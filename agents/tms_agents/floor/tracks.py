@@ -29,6 +29,8 @@ _QUALITY = 0.3
 _NEW_S = 30.0
 #: What is pushed is left within this (m).
 _PUSHED_M = 2.0
+#: What has moved with people beside it for less than this share of the way has moved by itself.
+_ALONE = 0.3
 #: Nobody stands with the feet so far apart (m) for long.
 _ASTRIDE_M = 0.48
 #: Two of them so near each other (m) are one.
@@ -305,6 +307,9 @@ class Tracks:
             return []
         self._association.decide()
         robot = self._is_robot(body)
+        if robot and body["from_furniture"] == 0 and body["pushed"] < _ALONE:
+            # It came by itself; whoever is beside it later does not push it.
+            body["from_furniture"] = -1
         old = self._missing(body)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
@@ -330,7 +335,7 @@ class Tracks:
         """The mover not seen now that this one most probably is: hidden, seated, or only thought to be seen."""
         best, best_gap = None, 1.0
         for other in self.bodies:
-            if not (other["used"] and other["confirmed"]):
+            if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
                 continue
             x, y, seen = float(other["x"]), float(other["y"]), float(other["seen"])
             if seen > body["first"] + 0.2:
