@@ -146,7 +146,7 @@ class FloorEstimator:
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s
-        if not is_object or known or self._furniture.explains(q, self._pieces(t), t):
+        if not is_object or known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = 2
             return []
         who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})

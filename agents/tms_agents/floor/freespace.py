@@ -21,6 +21,8 @@ _RELIABLE = 0.93
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range); no object is wider than this (m).
 _SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
 
+#: Beams that tell a shape.
+_PROFILE = 6
 #: So many beams beside a thing do not show the background alone.
 _GUARD = 2
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
@@ -40,6 +42,29 @@ def beam_of(bearing: float, first: float, step: float, n: int) -> float:
     if index < -0.5 or index > n - 0.5:
         return float(np.nan)
     return index
+
+
+@njit(cache=True)
+def _depth(ranges: Array, a: int, b: int, width: float) -> float:
+    """How far behind its surface, beams a to b, the middle of a thing is, as a share of its width.
+
+    Of a disc 0.39: its ends are farther off, both alike. Boxes, which are seldom as deep as long, show a flat or a
+    slanting face: about 0.3 and 0.27.
+    """
+    n = b - a + 1
+    third = n // 3
+    if n < _PROFILE:
+        return 0.36
+    one, two, three = 0.0, 0.0, 0.0
+    for i in range(third):
+        one += ranges[a + i] / third
+        two += ranges[a + third + i] / third
+        three += ranges[b - i] / third
+    if not np.isfinite(one + two + three):
+        return 0.36
+    if abs(three - one) > 0.13 * width:
+        return 0.27
+    return 0.39 if 0.5 * (one + three) - two > 0.07 * width else 0.3
 
 
 @njit(cache=True)
@@ -143,13 +168,13 @@ def look(
                 out.n = hits
                 out.spacing = away * abs(step)
                 out.width = (b - a + 1) * out.spacing
-                shift = 0.37 * min(out.width, 0.5)
                 m = (a + b) // 2
+                shift = _depth(ranges, a, b, out.width) * min(out.width, 0.5)
                 out.x = x / hits + shift * rays[m, o + 2]
                 out.y = y / hits + shift * rays[m, o + 3]
                 out.clean = 1 if alien == 0 and b - a + 1 == hits and not _cut(ranges, a, b) else 0
                 break
-            if 2 * beyond >= total and hidden == 0:
+            if 2 * beyond >= total and (hidden == 0 or beyond >= 2):
                 # Another way, by a mirror, may still show it.
                 out.verdict = FREE
             elif out.verdict == UNSEEN and hidden > 0:

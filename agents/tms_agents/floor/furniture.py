@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 #: A thin piece (m), like the leg of a chair, tells only together with another so near it (m) that went so soon (s).
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
+#: The legs of a chair that was moved stand still within so long (s).
+_TOGETHER_S = 2.0
 #: The ranges of one surface differ so little from beam to beam (m).
 _SAME_M = 0.05
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
@@ -66,8 +68,9 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
                 out[count, 0] = t - gone / beams
                 out[count, 1], out[count, 2] = x / beams, y / beams
                 out[count, 3] = (last - first + 1) * step * r_sum / beams
-                more = _goes_on(centre, weight, first - 1, first_r) or _goes_on(centre, weight, last + 1, last_r)
-                out[count, 4] = 0.0 if more else 1.0
+                left = _goes_on(centre, weight, first - 1, first_r) and _goes_on(centre, weight, first - 2, first_r)
+                right = _goes_on(centre, weight, last + 1, last_r) and _goes_on(centre, weight, last + 2, last_r)
+                out[count, 4] = 0.0 if left or right else 1.0
                 count += 1
             beams = 0
         if r > 0.0:
@@ -80,6 +83,17 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
             beams += 1
             last, last_r = i, r
     return count
+
+
+def _legs(print_: Any, prints: Any) -> bool:
+    """Whether the print and at least two others are thin, near each other, and stand there since the same time."""
+    if print_["width"] > _THIN_M:
+        return False
+    away = np.hypot(prints["x"] - print_["x"], prints["y"] - print_["y"])
+    thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)
+    since = np.abs(prints["first"] - print_["first"])
+    legs = thin & (away > 0.08) & (away < _GROUP_M) & (since < np.where(prints["revealed"] == 2, 6.0, _TOGETHER_S))
+    return int(np.count_nonzero(legs)) >= 2
 
 
 class Furniture:
@@ -96,8 +110,13 @@ class Furniture:
         count = _pieces(b.centre, b.weight, b.missing, view.rays, abs(view.step), t, self._rows)
         return [Piece(*row) for row in self._rows[:count].tolist()]
 
-    def explains(self, print_: Any, pieces: list[Piece], t: float) -> bool:
-        """Whether the print is a piece of furniture that has gone from somewhere near; each piece explains one."""
+    def explains(self, print_: Any, prints: Any, pieces: list[Piece], t: float) -> bool:
+        """Whether the print is a piece of furniture that has gone from somewhere near; each piece explains one.
+
+        Or thin as the leg of a chair, with two more among the ``prints`` that came to stand with it.
+        """
+        if _legs(print_, prints):
+            return True
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
         near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0]

@@ -160,7 +160,7 @@ class Objects:
             return []
         thing["used"], thing["label"] = 1, label
         thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]
-        thing["hits"] = min(int(print_["whole"]), 30)
+        thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
         thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["first"], t, 0.0, 0.0, t
         thing["rate"] = min(0.99, max(0.5, print_["hits"] / max(int(print_["looks"]), 1)))

@@ -52,8 +52,7 @@ def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
 def _set_aside(
     clusters: Any, of: NDArray[np.int64], prints: Any, bodies: Any, width_m: float, t: float, scratch: Any
 ) -> int:
-    """Move what may be feet to the front of ``clusters`` (m,) and ``of`` (m,), their prints; how many these are."""
-    feet = clusters.size
+    feet: int = clusters.size
     k = 0
     while k < feet:
         given = False
@@ -61,9 +60,9 @@ def _set_aside(
             q = prints[of[k]]
             if q.hits == 1:
                 q.given = 0
-            if t - q.first <= _NEW_S and q.owner < 0 and q.hits < 3 and clusters[k].width < width_m:
-                if not q.given and _put(clusters[k], q, prints, bodies, t):
-                    q.given = 1
+            new = t - q.first <= _NEW_S and q.owner < 0 and q.hits < 3 and clusters[k].width < width_m
+            if new and not q.given and _put(clusters[k], q, prints, bodies, t):
+                q.given = 1
             given = q.given == 1
         if not given:
             k += 1
@@ -81,4 +80,5 @@ _SCRATCH = np.zeros(1, CLUSTER)
 
 def set_aside(clusters: Any, of: NDArray[np.int64], prints: Any, bodies: Any, width_m: float, t: float) -> int:
     """Move what may be feet to the front of ``clusters`` (m,) and ``of`` (m,), their prints; how many these are."""
-    return int(_set_aside(clusters, of, prints, bodies, width_m, t, _SCRATCH))
+    count: int = _set_aside(clusters, of, prints, bodies, width_m, t, _SCRATCH)
+    return count

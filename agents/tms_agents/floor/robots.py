@@ -55,7 +55,7 @@ def _foot(c: Any, bodies: Any, t: float) -> bool:
 @njit(cache=True)
 def gather(clusters: Any, bodies: Any, most: float, t: float) -> int:
     """Join what is seen of each robot to one of the ``clusters`` (m,), up to ``most`` m wide; how many are left."""
-    m = clusters.size
+    m: int = clusters.size
     for b in range(bodies.size):
         body = bodies[b]
         if not body.used or not body.machine or t - body.seen > 2.0:
@@ -91,7 +91,7 @@ def gather(clusters: Any, bodies: Any, most: float, t: float) -> int:
 
 
 def sizes(robots: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """How wide robots look, m, from and to; without known ``robots`` (width, length) as wide as robots for rooms are."""
+    """How wide robots look, m, from and to; without known ``robots`` (width, length) like those for rooms."""
     if not robots:
         return 0.3, 0.9
     return min(min(size) for size in robots), max(math.hypot(*size) for size in robots)
