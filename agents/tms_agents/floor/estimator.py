@@ -15,7 +15,7 @@ from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Masks
-from tms_agents.floor.objects import Objects, candidates, near_movers
+from tms_agents.floor.objects import OBJECT, Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
@@ -131,22 +131,22 @@ class FloorEstimator:
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:
-            for index, is_object in objects.ripe(prints, bodies, t):
-                appeared += self._settle(index, t, is_object=is_object)
+            for index, kind in objects.ripe(prints, bodies, t):
+                appeared += self._settle(index, kind, t)
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared
 
     def _pieces(self, t: float) -> list[Piece]:
         return [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]
 
-    def _settle(self, index: int, t: float, *, is_object: bool) -> list[FloorEvent]:
+    def _settle(self, index: int, kind: int, t: float) -> list[FloorEvent]:
         """A print rests: it is an object or furniture."""
         q = self._prints[index]
-        if self._masks.outside(float(q["x"]), float(q["y"])):
+        if self._masks.outside(float(q["x"]), float(q["y"])) or (kind == OBJECT and self._objects.at(q)):
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s
-        if not is_object or known or self._furniture.explains(q, self._prints, self._pieces(t), t):
+        if kind != OBJECT or known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = 2
             return []
         who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})

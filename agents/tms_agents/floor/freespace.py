@@ -164,6 +164,9 @@ def look(
                         claimed[i] = True
                         hits += 1
                         a, b = min(a, i), max(b, i)
+                if out.verdict == HIT:
+                    # Seen directly already: what a mirror shows is the same thing.
+                    continue
                 out.verdict = HIT
                 out.n = hits
                 out.spacing = away * abs(step)
@@ -173,7 +176,9 @@ def look(
                 out.x = x / hits + shift * rays[m, o + 2]
                 out.y = y / hits + shift * rays[m, o + 3]
                 out.clean = 1 if alien == 0 and b - a + 1 == hits and not _cut(ranges, a, b) else 0
-                break
+                continue
+            if out.verdict == HIT:
+                continue
             if 2 * beyond >= total and (hidden == 0 or beyond >= 2):
                 # Another way, by a mirror, may still show it.
                 out.verdict = FREE

@@ -15,10 +15,14 @@ from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
 
+#: What a print that rests turns out to be.
+OBJECT, FURNITURE = 1, 2
 #: How near who acts is (m, Gaussian), and who is too far to have acted.
 _ARM_M, _FAR_M = 0.5, 1.6
 #: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
 _SURE, _PER_SCAN = 9.0, 1.5
+#: Things overlap if they are nearer than this share of their half widths (and m).
+_OVERLAP, _BESIDE_M = 0.6, 0.01
 #: One look is off by this at most (m).
 _TRUST_M = 0.04
 #: Surfaces lie this uncertain behind what is seen (m²).
@@ -71,7 +75,7 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
 def _ripe(
     prints: Any, bodies: Any, t: float, rest_s: float, alone_s: float, width_m: float, ripe: NDArray[np.int64]
 ) -> int:
-    """Prints that are objects (1) or furniture (2) by now, into ``ripe``; how many."""
+    """Prints that are an `OBJECT` or `FURNITURE` by now, into ``ripe``; how many."""
     count = 0
     for j in range(prints.size):
         q = prints[j]
@@ -82,7 +86,7 @@ def _ripe(
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
         if q.attached > 0.5:
-            ripe[j] = 2
+            ripe[j] = FURNITURE
             count += 1
             continue
         if q.spread > 0.03:
@@ -110,10 +114,10 @@ def _ripe(
         if not alone and not given and (not third or t - q.owned < alone_s):
             continue
         if q.width < width_m:
-            ripe[j] = 1
+            ripe[j] = OBJECT
             count += 1
         elif alone and age > 2.0:
-            ripe[j] = 2
+            ripe[j] = FURNITURE
             count += 1
     return count
 
@@ -143,14 +147,14 @@ class Objects:
             thing["used"] = 0
         return events
 
-    def ripe(self, prints: Any, bodies: Any, t: float) -> list[tuple[int, bool]]:
-        """Prints that are objects (True) or furniture (False) by now."""
+    def ripe(self, prints: Any, bodies: Any, t: float) -> list[tuple[int, int]]:
+        """Prints that rest, and what each is: `OBJECT` or `FURNITURE`."""
         s = self._settings
         if self._ripe.size != prints.size:
             self._ripe = np.zeros(prints.size, np.int64)
         if not _ripe(prints, bodies, t, s.rest_s, s.alone_s, s.object_width_m, self._ripe):
             return []
-        return [(j, bool(self._ripe[j] == 1)) for j in np.flatnonzero(self._ripe).tolist()]
+        return [(j, int(self._ripe[j])) for j in np.flatnonzero(self._ripe).tolist()]
 
     def born(self, print_: Any, label: int, who: Candidates, t: float) -> list[FloorEvent]:
         """The print is an object."""
@@ -166,6 +170,12 @@ class Objects:
         thing["rate"] = min(0.99, max(0.5, print_["hits"] / max(int(print_["looks"]), 1)))
         since, width = float(thing["since"]), float(print_["width"])
         return [Appeared(t, label, "object", _xy(thing), _cov(thing), False, since, who, width)]
+
+    def at(self, print_: Any) -> bool:
+        """Whether an object lies where the print is: another laser, or a mirror, shows it a little beside its place."""
+        things = self.things[self.things["used"] == 1]
+        away = np.hypot(things["x"] - print_["x"], things["y"] - print_["y"])
+        return bool((away < _OVERLAP * (things["half"] + 0.5 * print_["width"]) + _BESIDE_M).any())
 
     def labels(self) -> list[FloorLabel]:
         """The objects there are, hidden ones too."""
