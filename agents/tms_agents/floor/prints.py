@@ -14,8 +14,12 @@ Array = NDArray[np.float64]
 
 #: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
 _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
+#: The mean place of what does not move stays within this (m, and per metre of range).
+_STILL_M, _STILL = 0.008, 0.001
 #: Somebody is at a print when the body or a foot is so near (m).
 NEAR_M = 0.36
+#: Who has moved so far (m) may be somebody.
+_WALKED_M = 0.15
 
 
 @njit(cache=True)
@@ -101,6 +105,8 @@ def follow(
             q.spread += gain * (off - q.spread)
             q.beams += gain * (c.n - q.beams)
             q.near, q.spacing = c.near, c.spacing
+        if q.hits == 1 or np.hypot(q.x - q.still_x, q.y - q.still_y) > _STILL_M + _STILL * q.near:
+            q.still_x, q.still_y, q.still = q.x, q.y, t
     for j in range(p):
         q = prints[j]
         if not q.used or taken[j]:
@@ -117,6 +123,11 @@ def follow(
 @njit(cache=True)
 def attend(prints: Any, bodies: Any, t: float) -> None:
     """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy)."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        body.still = 0.0
+        if body.used and body.a_print >= 0 and body.b_print >= 0 and max(t - body.a_seen, t - body.b_seen) < 0.5:
+            body.still = t - max(prints[body.a_print].still, prints[body.b_print].still)
     for j in range(prints.size):
         q = prints[j]
         if not q.used:
@@ -129,7 +140,13 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
         q.owner = -1
         for b in range(bodies.size):
             body = bodies[b]
-            if not body.used or not body.confirmed:
+            if not body.used:
+                continue
+            if not body.confirmed:
+                # Somebody who is not believed yet, but has walked.
+                if np.hypot(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3:
+                    if np.hypot(body.x - q.x, body.y - q.y) < NEAR_M:
+                        q.busy = t
                 continue
             if body.a_print == j or body.b_print == j:
                 q.owner = b

@@ -32,6 +32,9 @@ PRINT = np.dtype(
         ("busy", "f8"),
         ("revealed", "i8"),
         ("given", "i8"),
+        ("still_x", "f8"),
+        ("still_y", "f8"),
+        ("still", "f8"),
         ("sensor", "i8"),
         ("first_beam", "i8"),
         ("last_beam", "i8"),
@@ -92,6 +95,7 @@ BODY = np.dtype(
         ("pushed", "f8"),
         ("quality", "f8"),
         ("single", "f8"),
+        ("still", "f8"),
     ]
 )
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
-#: Nobody stands for so long (s) without lifting a foot.
+#: Nobody stands for so long (s) without shifting a foot.
 _STILL_S = 16.0
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run.
 _QUALITY = 0.3
@@ -51,7 +51,7 @@ def _is_lone(body: Any, t: float) -> bool:
     if body.robot or body.wide > 0.6 or body.width > 0.2:
         return False
     a, b = t - body.a_seen, t - body.b_seen
-    if max(a, b) < 0.5 and t - max(body.a_since, body.b_since) > _STILL_S:
+    if body.still > _STILL_S:
         return True
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)
     if max(a, b) < 0.5 and apart > _ASTRIDE_M and t - max(body.a_since, body.b_since) > 1.5:
