@@ -189,6 +189,24 @@ def look(
 
 
 @njit(cache=True)
+def silent(
+    x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether most beams to (x, y) ± half m echo nothing, though the background there does: black or glossy."""
+    away = np.hypot(x - pose[0], y - pose[1])
+    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, ranges.size)
+    if np.isnan(middle):
+        return False
+    reach = np.arctan(half / max(away, 0.05)) / abs(step)
+    low, high = max(0, int(np.ceil(middle - reach - 0.5))), min(ranges.size - 1, int(middle + reach + 0.5))
+    count = 0
+    for i in range(low, high + 1):
+        if np.isinf(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
+            count += 1
+    return bool(count > 0 and 3 * count >= 2 * (high - low + 1))
+
+
+@njit(cache=True)
 def guard(states: NDArray[np.int8], claimed: NDArray[np.bool_]) -> None:
     """Extend ``claimed`` (n,) to the background beside it: at the edge of a thing before a wall a beam shows both."""
     n = states.size

@@ -46,6 +46,7 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
         if seen.verdict == HIT:
             thing.seen = t
             thing.rate += 0.02 * (1.0 - thing.rate)
+            thing.solid += 0.02 * (1.0 - thing.solid)
             thing.free = 0.0
             thing.doubt = max(0.0, thing.doubt - 3.0)
             if seen.clean:
@@ -56,14 +57,16 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
                 thing.half += gain * _within(0.5 * seen.width - thing.half)
                 thing.var = _SURFACE_VAR + 1e-4 / (thing.hits + 1)
         elif seen.verdict == SILENT:
-            # Black and glossy things do not always echo.
+            # Black and glossy things do not always echo, but nothing is seen through them.
             thing.rate -= 0.02 * thing.rate
+            thing.solid += 0.02 * (1.0 - thing.solid)
         elif seen.verdict == FREE:
             # Since the last look by any sensor, but no longer than a scan takes: between them it was hidden.
             thing.free += min(dt, t - thing.free_at, 0.2)
-            thing.doubt += min(_PER_SCAN, -np.log(max(1.0 - thing.rate, 1e-3)))
+            thing.doubt += min(_PER_SCAN, -np.log(max(1.0 - thing.solid, 1e-3)))
             if thing.doubt < 4.0:
                 thing.rate -= 0.02 * thing.rate
+                thing.solid -= 0.02 * thing.solid
         if seen.verdict == HIT or seen.verdict == FREE:
             thing.free_at = t
         if thing.free > 0.0:
@@ -92,7 +95,9 @@ def _ripe(
         if q.spread > 0.03:
             continue
         # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
-        if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) or (
+        # What is silent most of the time shows less of itself.
+        quiet = t - q.silent < 1.0 and q.hits >= 6
+        if (q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet) or (
             q.beams < 1.5 and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks)
         ):
             continue
@@ -167,7 +172,7 @@ class Objects:
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
         thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["first"], t, 0.0, 0.0, t
-        thing["rate"] = min(0.99, max(0.5, print_["hits"] / max(int(print_["looks"]), 1)))
+        thing["rate"] = thing["solid"] = min(0.99, max(0.5, print_["hits"] / max(int(print_["looks"]), 1)))
         since, width = float(thing["since"]), float(print_["width"])
         return [Appeared(t, label, "object", _xy(thing), _cov(thing), False, since, who, width)]
 

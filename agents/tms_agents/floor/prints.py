@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.freespace import FREE, clear
+from tms_agents.floor.freespace import FREE, clear, silent
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def follow(
             q = prints[j]
             q.used, q.first, q.hits, q.looks, q.whole = 1, t, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
-            q.last = t
+            q.last, q.silent = t, -1e9
             q.attached = c.attached
             q.owner, q.owned, q.busy, q.revealed, q.given = -1, -1e9, -1e9, 0, 0
         q = prints[j]
@@ -87,7 +87,7 @@ def follow(
             q.first, q.hits, q.looks, q.whole, q.spread = t, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
             q.revealed = 0
-        if t - q.last > _GONE_S:
+        if t - max(q.last, q.silent) > _GONE_S:
             # Somebody else may stand there now.
             q.first, q.hits, q.looks, q.whole, q.spread = t, 0, 0, 0, 0.0
         q.hits += 1
@@ -118,6 +118,8 @@ def follow(
                 q.looks += 1
             if t - q.last > _GONE_S:
                 q.used = 0
+        elif silent(q.x, q.y, 0.5 * q.width, ranges, longest, pose, first, step):
+            q.silent = t
 
 
 @njit(cache=True)

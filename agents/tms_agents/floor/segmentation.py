@@ -144,6 +144,9 @@ def _segment(
         for side in (a - 1, a - 2, b + 1, b + 2):
             if 0 <= side < n and ranges[side] < c.near - 0.1 and not np.isnan(ranges[side]):
                 c.cut = 1
+        for side in (a - 1, b + 1):
+            if 0 <= side < n and np.isinf(ranges[side]) and np.isfinite(longest[side]):
+                c.cut = 1
         middle = (a + b) // 2
         c.gap = longest[middle] - ranges[middle]
         shift = _DEPTH * min(c.width, 0.5)

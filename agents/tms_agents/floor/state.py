@@ -32,6 +32,7 @@ PRINT = np.dtype(
         ("busy", "f8"),
         ("revealed", "i8"),
         ("given", "i8"),
+        ("silent", "f8"),
         ("still_x", "f8"),
         ("still_y", "f8"),
         ("still", "f8"),
@@ -115,6 +116,7 @@ THING = np.dtype(
         ("free_at", "f8"),
         ("doubt", "f8"),
         ("rate", "f8"),
+        ("solid", "f8"),
     ]
 )
 
