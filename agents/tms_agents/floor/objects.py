@@ -20,7 +20,7 @@ OBJECT, FURNITURE = 1, 2
 #: How near who acts is (m, Gaussian), and who is too far to have acted.
 _ARM_M, _FAR_M = 0.5, 1.6
 #: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
-_SURE, _PER_SCAN = 9.0, 1.5
+_SURE, _PER_SCAN = 7.5, 1.5
 #: Things overlap if they are nearer than this share of their half widths (and m).
 _OVERLAP, _BESIDE_M = 0.6, 0.01
 #: One look is off by this at most (m).

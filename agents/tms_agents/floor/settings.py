@@ -82,7 +82,7 @@ class FloorSettings:
     alone_s: float = 0.7
     object_width_m: float = 0.26
     #: Removal: so much time of beams passing beyond.
-    free_s: float = 0.6
+    free_s: float = 0.5
     #: Something wide that rests so long without a mover at it is furniture.
     absorb_s: float = 2.0
 

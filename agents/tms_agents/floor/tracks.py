@@ -25,6 +25,8 @@ _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 _LONE_S = 4.0
 #: Nobody stands for so long (s) without shifting a foot.
 _STILL_S = 16.0
+#: What was pushed stands still for so long (s): it is furniture.
+_PARKED_S = 5.0
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run.
 _QUALITY = 0.3
 #: What is new for so long (s) may turn out to be furniture.
@@ -58,6 +60,13 @@ def _is_lone(body: Any, t: float) -> bool:
         return True
     since = body.a_since if a < b else body.b_since
     return bool(max(a, b) > 1.0 and t - since > 1.0)
+
+
+@njit(cache=True)
+def _is_parked(body: Any, t: float) -> bool:
+    """Whether it is as wide as furniture, has never gone far by itself, and stands still."""
+    since = body.a_since if body.a_seen >= body.b_seen else body.b_since
+    return bool(body.wide > 0.5 and not body.machine and t - since > _PARKED_S)
 
 
 @njit(cache=True)
@@ -135,7 +144,7 @@ def _review(
             if body.lone > _LONE_S or misled(body):
                 # One thing that does not move is no person: whoever it was is somewhere else.
                 actions[b] = _LOST
-            elif body.quality < _QUALITY:
+            elif body.quality < _QUALITY or _is_parked(body, t):
                 actions[b] = _GONE
             elif body.stale:
                 actions[b] = _BACK
