@@ -99,6 +99,7 @@ class FloorEstimator:
             view.ranges,
             states,
             view.background.empty,
+            view.background.longest,
             view.rays,
             view.ways,
             view.pose,

@@ -83,6 +83,7 @@ def look(
     ranges: Array,
     states: NDArray[np.int8],
     empty: Array,
+    longest: Array,
     rays: Array,
     views: Array,
     pose: Array,
@@ -153,12 +154,18 @@ def look(
                 wide = int(_WIDEST_M / (away * abs(step)))
                 for side in (-1, 1):
                     i = b if side > 0 else a
+                    last = ranges[i]
                     while 0 <= i + side < n and b - a + 1 < wide:
                         i += side
                         r = ranges[i]
+                        if not np.isfinite(r) and np.isfinite(longest[i]):
+                            # What is black or glossy echoes in parts.
+                            continue
                         known = claimed[i] or (r > rays[i, 8]) != (v > 0)
-                        if states[i] != FOREGROUND or known or abs(r - ranges[i - side]) > _SMOOTH_M + _SMOOTH * r:
+                        far = abs(r - last) > _SMOOTH_M + _SMOOTH * r
+                        if states[i] != FOREGROUND or known or far or abs(i - (b if side > 0 else a)) > wide // 2:
                             break
+                        last = r
                         x += rays[i, o] + r * rays[i, o + 2]
                         y += rays[i, o + 1] + r * rays[i, o + 3]
                         claimed[i] = True
@@ -180,8 +187,9 @@ def look(
             if out.verdict == HIT:
                 continue
             if 2 * beyond >= total and (hidden == 0 or beyond >= 2):
-                # Another way, by a mirror, may still show it.
-                out.verdict = FREE
+                # By way of a mirror places are less exact: what hides a thing directly says more.
+                if v == 0 or out.verdict == UNSEEN:
+                    out.verdict = FREE
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
             elif out.verdict == UNSEEN and beyond == 0:

@@ -23,6 +23,8 @@ _ARM_M, _FAR_M = 0.5, 1.6
 _SURE, _PER_SCAN = 7.5, 1.5
 #: Things overlap if they are nearer than this share of their half widths (and m).
 _OVERLAP, _BESIDE_M = 0.6, 0.01
+#: What echoes less often is black or glossy, and its parts are so near each other (m).
+_QUIET, _PARTS_M = 0.9, 0.1
 #: One look is off by this at most (m).
 _TRUST_M = 0.04
 #: Surfaces lie this uncertain behind what is seen (m²).
@@ -180,7 +182,10 @@ class Objects:
         """Whether an object lies where the print is: another laser, or a mirror, shows it a little beside its place."""
         things = self.things[self.things["used"] == 1]
         away = np.hypot(things["x"] - print_["x"], things["y"] - print_["y"])
-        return bool((away < _OVERLAP * (things["half"] + 0.5 * print_["width"]) + _BESIDE_M).any())
+        # Of what is black or glossy now this part echoes, now that.
+        quiet = (things["rate"] < _QUIET) | (print_["silent"] > print_["first"])
+        beside = np.where(quiet, _PARTS_M, _BESIDE_M)
+        return bool((away < _OVERLAP * (things["half"] + 0.5 * print_["width"]) + beside).any())
 
     def labels(self) -> list[FloorLabel]:
         """The objects there are, hidden ones too."""

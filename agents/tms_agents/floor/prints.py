@@ -79,6 +79,7 @@ def follow(
             q.used, q.first, q.hits, q.looks, q.whole = 1, t, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last, q.silent = t, -1e9
+            q.still_x, q.still_y, q.still = c.x, c.y, t
             q.attached = c.attached
             q.owner, q.owned, q.busy, q.revealed, q.given = -1, -1e9, -1e9, 0, 0
         q = prints[j]
@@ -105,7 +106,8 @@ def follow(
             q.spread += gain * (off - q.spread)
             q.beams += gain * (c.n - q.beams)
             q.near, q.spacing = c.near, c.spacing
-        if q.hits == 1 or np.hypot(q.x - q.still_x, q.y - q.still_y) > _STILL_M + _STILL * q.near:
+        off = np.hypot(q.x - q.still_x, q.y - q.still_y)
+        if off > (_STILL_M + _STILL * c.near) * (1.0 if q.whole > 4 else 2.0):
             q.still_x, q.still_y, q.still = q.x, q.y, t
     for j in range(p):
         q = prints[j]
