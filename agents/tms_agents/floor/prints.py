@@ -148,9 +148,9 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
                 continue
             if not body.confirmed:
                 # Somebody who is not believed yet, but has walked.
-                if np.hypot(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3:
-                    if np.hypot(body.x - q.x, body.y - q.y) < NEAR_M:
-                        q.busy = t
+                walked = np.hypot(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3
+                if walked and np.hypot(body.x - q.x, body.y - q.y) < NEAR_M:
+                    q.busy = t
                 continue
             if body.a_print == j or body.b_print == j:
                 q.owner = b

@@ -24,7 +24,7 @@ _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
 #: Nobody stands for so long (s) without shifting a foot.
-_STILL_S = 16.0
+_STILL_S = 40.0
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run.

@@ -1,0 +1,101 @@
+"""Things, furniture and robots where it is hard: before a wall, black, at somebody's feet, pushed, in parts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from floor_rooms import WALLS, Room, Segment, box, cast, thing, together, walker
+
+from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, Scene, Vanished
+
+#: Somebody comes in at the right, goes to the upper wall and back; or to the middle, and stays there for long.
+AT_THE_WALL = [(9.0, 4.9, 2.0), (12.0, 2.9, 3.5), (14.0, 2.9, 3.5), (17.0, 4.9, 2.0)]
+STAYS = [(9.0, 4.9, 2.0), (12.0, 2.2, 2.0), (40.0, 2.2, 2.0)]
+
+
+def born(events: list[FloorEvent], kind: str) -> list[Appeared]:
+    return [event for event in events if isinstance(event, Appeared) and event.kind == kind]
+
+
+def test_a_thing_right_before_a_wall_stays_a_thing() -> None:
+    _, events = Room(together(walker(AT_THE_WALL), thing(2.5, 3.94, 0.04, 13.0, 150.0))).play(152.0)
+    (put,) = born(events, "object")
+    assert math.hypot(put.xy[0] - 2.5, put.xy[1] - 3.94) < 0.02
+    (taken,) = [event for event in events if isinstance(event, Vanished) and event.label == put.label]
+    assert 150.0 < taken.t < 151.0
+
+
+def test_a_thing_is_told_while_who_put_it_still_stands_there() -> None:
+    _, events = Room(together(walker(STAYS), thing(1.75, 2.0, 0.05, 14.0))).play(20.0)
+    (put,) = born(events, "object")
+    assert put.since < 14.3
+    assert put.t < 16.5
+    (who,) = born(events, "mover")
+    assert put.candidates[0][0] == who.label
+
+
+def test_feet_that_stand_for_long_are_no_things() -> None:
+    _, events = Room(walker(STAYS)).play(40.0)
+    assert not born(events, "object")
+
+
+def test_a_black_thing_is_found_by_the_little_that_echoes() -> None:
+    """Nine beams of ten that meet it are lost; once it is gone, the floor behind it is seen again."""
+    black = thing(2.0, 2.0, 0.05, 13.0, 60.0)
+    room = Room(walker([(9.0, 4.9, 2.45), (12.0, 2.4, 2.35), (17.0, 4.9, 2.45)]))
+    rng = np.random.default_rng(1)
+    estimator = FloorEstimator(room.sensors)
+    events: list[FloorEvent] = []
+    for name, t, ranges in room.scans(63.0):
+        met = cast(room.sensors[name], black(t), WALLS)
+        on_it = met < cast(room.sensors[name], (), WALLS) - 0.01
+        echo = np.where(rng.random(ranges.size) < 0.1, met + rng.normal(0.0, 0.004, ranges.size), np.inf)
+        events += estimator.scan(name, t, np.where(on_it & (ranges > met), echo, ranges))
+    (put,) = born(events, "object")
+    assert math.hypot(put.xy[0] - 2.0, put.xy[1] - 2.0) < 0.05
+    (taken,) = [event for event in events if isinstance(event, Vanished) and event.label == put.label]
+    assert 60.0 < taken.t < 61.5
+
+
+def test_a_robot_is_one_robot_in_parts_and_beside_people() -> None:
+    """It drives past a table's legs, waits, and goes on; somebody walks close by meanwhile."""
+    legs = [(2.1, 1.2, 0.03), (2.3, 1.0, 0.03), (2.55, 1.3, 0.03)]
+    times, xs = [9.0, 17.0, 40.0, 46.0], [4.6, 2.4, 2.4, 3.6]
+
+    def place(t: float) -> float:
+        return float(np.interp(t, times, xs))
+
+    def segments(t: float) -> tuple[Segment, ...]:
+        return WALLS if t < 9.0 else (*WALLS, *box(place(t), 2.6, 0.55, 0.42))
+
+    passing = walker([(20.0, 4.9, 2.1), (24.0, 2.6, 2.15), (28.0, 2.1, 2.15), (38.0, 4.9, 2.1)])
+    seen: set[int] = set()
+    missed = 0
+
+    def check(t: float, estimator: FloorEstimator) -> None:
+        nonlocal missed
+        near = [one for one in estimator.labels() if math.hypot(one.xy[0] - place(t), one.xy[1] - 2.6) < 0.3]
+        if t > 17.0:
+            seen.update(one.id for one in near if one.robot)
+            missed += not any(one.robot for one in near)
+
+    room = Room(together(lambda _: legs, passing), segments)
+    _, events = room.play(46.0, scene=Scene(robots=((0.55, 0.42),)), each=check)
+    assert len(seen) == 1
+    assert missed < 10
+    assert not [one for one in born(events, "object") if one.t > 17.0]
+
+
+def test_a_trolley_that_was_pushed_is_nobody_when_it_stands() -> None:
+    def place(t: float) -> float:
+        return float(np.interp(t, [12.0, 16.0], [2.4, 3.6]))
+
+    def segments(t: float) -> tuple[Segment, ...]:
+        return (*WALLS, *box(place(t), 2.4, 0.55, 0.35))
+
+    pusher = walker([(9.0, 4.9, 1.6), (11.0, 2.1, 1.9), (12.0, 2.1, 1.9), (16.0, 3.3, 1.9), (20.0, 4.9, 0.8)])
+    estimator, events = Room(pusher, segments).play(30.0)
+    movers = [one for one in estimator.labels() if one.kind == "mover"]
+    assert not [one for one in movers if math.hypot(one.xy[0] - 3.6, one.xy[1] - 2.4) < 0.5]
+    assert len(born(events, "object")) <= 1
