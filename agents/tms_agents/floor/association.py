@@ -9,18 +9,21 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
-from tms_agents.floor.bodies import UNLIKELY, begin, costs, known, narrow, predict, update
+from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.freespace import FREE, clear
+from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.shine import learn
 from tms_agents.floor.state import BODY, empty
 
 Array = NDArray[np.float64]
 
 #: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and than its parent's best.
-_KEPT, _WORSE, _BRANCH = 8, 14.0, 7.0
-_CHILDREN = 32
+_KEPT, _WORSE, _BRANCH = 12, 14.0, 7.0
+_CHILDREN = 48
 #: Bodies so near each other (m, each axis), on the same prints, are at the same place.
 _NEAR_M = 0.08
+_ALIKE = 0.3
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
@@ -34,6 +37,9 @@ def _crowded(c: Any, bodies: Any) -> bool:
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
+            return True
+        # Legs that are one thing to the laser fall apart now and then.
+        if body.used and body.confirmed and np.hypot(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
             return True
     return False
 
@@ -66,6 +72,7 @@ def _apply(
     columns: NDArray[np.int64],
     clusters: Any,
     of: NDArray[np.int64],
+    marks: Array,
     free: NDArray[np.bool_],
     blank: Any,
     prints: Any,
@@ -80,6 +87,9 @@ def _apply(
             free[i] = False
     for column in range(k):
         a, b = feet[2 * column], feet[2 * column + 1]
+        for i in (a, b):
+            if i >= 0 and not clusters[i].cut:
+                learn(bodies[rows[column]], marks[i, 0], marks[i, 1])
         one = clusters[a] if a >= 0 else blank[0]
         two = clusters[b] if b >= 0 else blank[0]
         update(
@@ -87,9 +97,12 @@ def _apply(
             one,
             a >= 0,
             of[a] if a >= 0 else -1,
+            marks[a, 2] if a >= 0 else 0.0,
             two,
             b >= 0,
             of[b] if b >= 0 else -1,
+            marks[b, 2] if b >= 0 else 0.0,
+            (a < 0) != (b < 0) and together(bodies[rows[column]], clusters, max(a, b), t),
             prints,
             t,
         )
@@ -97,7 +110,14 @@ def _apply(
 
 @njit(cache=True)
 def _complete(
-    bodies: Any, clusters: Any, of: NDArray[np.int64], free: NDArray[np.bool_], blank: Any, prints: Any, t: float
+    bodies: Any,
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    blank: Any,
+    prints: Any,
+    t: float,
 ) -> None:
     """What the believed movers have left goes to those not yet believed, and then begins new ones."""
     m = clusters.size
@@ -108,9 +128,9 @@ def _complete(
         columns = np.full(m, -1)
         if m:
             cost = np.empty((m, 2 * k + m))
-            costs(clusters, of, free, prints, bodies, rows, t, cost)
+            costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
             assign(cost, columns)
-        _apply(bodies, rows, columns, clusters, of, free, blank, prints, t)
+        _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t)
     for i in range(m):
         c = clusters[i]
         if (
@@ -149,6 +169,8 @@ def _same(one: Any, two: Any) -> bool:
             near = _NEAR_M if p.a_print < 0 and p.b_print < 0 else 4.0 * _NEAR_M
             if abs(p.x - q.x) > near or abs(p.y - q.y) > near:
                 continue
+            if abs(p.vx - q.vx) > _ALIKE or abs(p.vy - q.vy) > _ALIKE:
+                continue
             straight = p.a_print == q.a_print and p.b_print == q.b_print
             if straight or (p.a_print == q.b_print and p.b_print == q.a_print):
                 found = True
@@ -172,6 +194,16 @@ def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float
 
 
 @njit(cache=True)
+def _copy(source: Any, target: Any) -> None:
+    """Copy the bodies that are used."""
+    for b in range(source.size):
+        if source[b].used:
+            target[b] = source[b]
+        else:
+            target[b].used = 0
+
+
+@njit(cache=True)
 def _advance(
     hypotheses: Any,
     spare: Any,
@@ -179,6 +211,7 @@ def _advance(
     count: int,
     clusters: Any,
     of: NDArray[np.int64],
+    marks: Array,
     blank: Any,
     prints: Any,
     t: float,
@@ -206,7 +239,7 @@ def _advance(
                 children += 1
             continue
         cost = np.empty((m, 2 * k + m))
-        costs(clusters, of, everything, prints, bodies, rows[:k], t, cost)
+        costs(clusters, of, marks, everything, prints, bodies, rows[:k], t, cost)
         known(clusters, bodies, t, cost[:, 2 * k :])
         columns = np.full(m, -1)
         best = assign(cost, columns)
@@ -242,12 +275,11 @@ def _advance(
             break
         bodies = spare[kept]
         parent = hypotheses[child_parent[o]]
-        for b in range(n):
-            bodies[b] = parent[b]
+        _copy(parent, bodies)
         k = _rows(bodies, 1, rows)
         free = np.ones(m, np.bool_)
-        _apply(bodies, rows[:k], child_columns[o], clusters, of, free, blank, prints, t)
-        _complete(bodies, clusters, of, free, blank, prints, t)
+        _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t)
+        _complete(bodies, clusters, of, marks, free, blank, prints, t)
         missed = _missed(bodies, rows[:k], t, sight)
         known_already = False
         for j in range(kept):
@@ -263,8 +295,7 @@ def _advance(
     best = int(np.argmin(scores[:kept]))
     for h in range(kept):
         source = best if h == 0 else (0 if h == best else h)
-        for b in range(n):
-            hypotheses[h, b] = spare[source, b]
+        _copy(spare[source], hypotheses[h])
     scores[0], scores[best] = scores[best], scores[0]
     scores[:kept] -= scores[0]
     for i in range(m):
@@ -281,11 +312,24 @@ class Association:
         self._count = 1
         self.bodies = self._hypotheses[0]
 
-    def step(self, clusters: Any, of: NDArray[np.int64], prints: Any, t: float, sight: Any) -> NDArray[np.bool_]:
-        """Take in the clusters (m,) of a scan, their prints ``of`` (m,), `View.sight`: which are somebody's."""
+    def step(
+        self, clusters: Any, of: NDArray[np.int64], marks: Array, prints: Any, t: float, sight: Any
+    ) -> NDArray[np.bool_]:
+        """Take in the clusters (m,) of a scan, their prints ``of`` (m,) and ``marks`` (m, 3), `View.sight`: whose."""
         taken = np.zeros(clusters.size, np.bool_)
         self._count = _advance(
-            self._hypotheses, self._spare, self._scores, self._count, clusters, of, _BLANK, prints, t, sight, taken
+            self._hypotheses,
+            self._spare,
+            self._scores,
+            self._count,
+            clusters,
+            of,
+            marks,
+            _BLANK,
+            prints,
+            t,
+            sight,
+            taken,
         )
         return taken
 

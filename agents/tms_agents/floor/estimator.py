@@ -20,6 +20,7 @@ from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
+from tms_agents.floor.shine import measure
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.tracks import Tracks
 from tms_agents.floor.view import View
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 
 #: As many as there can be at once.
 _BODIES, _PRINTS, _THINGS = 32, 192, 128
+_DARK = np.zeros(0)
 
 
 class FloorEstimator:
@@ -54,6 +56,7 @@ class FloorEstimator:
         self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
+        self._marks = np.zeros((256, 3))
         self._labels = 0
         self._t = -np.inf
 
@@ -79,7 +82,7 @@ class FloorEstimator:
         view.claimed[:] = False
         events: list[FloorEvent] = []
         if background.ready:
-            events = self._understand(view, states, t, dt)
+            events = self._understand(view, states, t, dt, _lights(intensities, view.n))
         background.learn(view.ranges, view.claimed, dt)
         return events
 
@@ -91,7 +94,7 @@ class FloorEstimator:
         """Where the sensors are: as given, refined by what several of them have seen of the same walkers."""
         return {name: self._extrinsics.pose(view.index) for name, view in self._views.items()}
 
-    def _understand(self, view: View, states: NDArray[np.int8], t: float, dt: float) -> list[FloorEvent]:
+    def _understand(self, view: View, states: NDArray[np.int8], t: float, dt: float, lights: Array) -> list[FloorEvent]:
         bodies, prints = self._tracks.bodies, self._prints
         objects = self._objects
         look(
@@ -113,8 +116,10 @@ class FloorEstimator:
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
+        marks = self._marks[:feet]
+        measure(clusters[:feet], view.ranges, lights, view.sensor.sweep.time_increment_s, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
-        somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], prints, t, view.sight)
+        somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks, prints, t, view.sight)
         if recognize(bodies, *self._robots):
             self._association.decide()
         attend(prints, bodies, t)
@@ -238,3 +243,10 @@ class FloorEstimator:
         except (KeyError, TypeError) as error:
             raise ValueError(f"the saved state of the floor estimator is damaged: {error}") from None
         return self
+
+
+def _lights(intensities: Array | None, n: int) -> Array:
+    """Intensities (n,), or none (0,)."""
+    if intensities is None or np.shape(intensities) != (n,):
+        return _DARK
+    return np.asarray(intensities, dtype=np.float64)

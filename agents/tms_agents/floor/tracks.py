@@ -16,6 +16,7 @@ from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Move
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.masks import Area
 from tms_agents.floor.settings import FloorSettings, Scene
+from tms_agents.floor.shine import exchanged
 
 Array = NDArray[np.float64]
 
@@ -117,14 +118,19 @@ def _review(
                 continue
             if unseen > 0.0:
                 continue
-            beside, halved = np.inf, False
+            beside, halved, part = np.inf, False, False
             for o in range(bodies.size):
                 if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
                     away = np.hypot(bodies[o].x - body.x, bodies[o].y - body.y)
                     beside = min(beside, away)
+                    # A part of somebody who is wide: legs that are one thing to the laser fall apart now and then.
+                    part = part or away < 0.12 + 0.5 * bodies[o].width
                     # One foot of somebody there is not seen now: this may be it.
                     if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
                         halved = True
+            if part:
+                body.used = 0
+                continue
             needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
             needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
             if halved:
@@ -207,6 +213,7 @@ class Tracks:
             bool(self._region.polygons),
             learned,
         )
+        self._rename(t)
         events: list[FloorEvent] = self._unite(t)
         for index in np.flatnonzero(self._actions).tolist():
             body, action = self.bodies[index], self._actions[index]
@@ -260,6 +267,16 @@ class Tracks:
             return self._lost(index, t)
         self._association.forget(index)
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
+
+    def _rename(self, t: float) -> None:
+        """Give two people back their own names."""
+        one, two = exchanged(self.bodies, t)
+        if one < 0:
+            return
+        self._association.decide()
+        for field in ("label", "first", "own", "own_n", "told_x", "told_y", "told_at"):
+            values = self.bodies[field]
+            values[[one, two]] = values[[two, one]]
 
     def _unite(self, t: float) -> list[FloorEvent]:
         """Two movers with one foot each at one place are one: the younger label goes."""

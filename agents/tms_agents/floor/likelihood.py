@@ -1,0 +1,222 @@
+"""How likely a cluster is to be somebody's foot: one that stands, swings, or has landed; or nobody's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.bodies import STAND_M, WIDE_M, narrow, together
+from tms_agents.floor.gait import SHOES
+from tms_agents.floor.shine import unlike
+
+Array = NDArray[np.float64]
+
+UNLIKELY = 1e6
+#: Feet are so far from the body along its way and aside (m); nobody's foot is farther away than this.
+_ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
+#: Time for which a new print counts as a fresh step (s).
+_FRESH_S = 1.0
+#: Two feet side by side are hardly wider (m).
+_BROAD_M = 0.45
+#: Negative log likelihood: of a foot seen just now being somewhere else, of having landed where something stood
+#: before, of swinging while the other foot swings.
+_SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
+#: What still stands after so long (s) while the other foot goes may be no foot.
+_LEFT_S, _LEFT = 1.0, 0.5
+#: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
+_ROLL_M, _ROLLED_M = 0.08, 0.17
+#: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
+#: somebody new known already, and what has rested there as nobody's.
+_NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
+
+
+@njit(cache=True)
+def _apart(dx: float, dy: float, body: Any, speed: float, along: float, aside: float) -> float:
+    """Negative log likelihood of being (dx, dy) from the body: more along the way it goes than aside."""
+    if speed > 0.3:
+        ux, uy = body.vx / speed, body.vy / speed
+        dx, dy = dx * ux + dy * uy, dy * ux - dx * uy
+    else:
+        along = aside = 0.5 * (along + aside)
+    return float(0.5 * (dx * dx / (along * along + body.pp) + dy * dy / (aside * aside + body.pp)))
+
+
+@njit(cache=True)
+def _landing(dx: float, dy: float, body: Any, speed: float, side: float) -> float:
+    """The same of a foot landing (dx, dy) from the other: a stride ahead and on its own side."""
+    ux, uy = body.vx / speed, body.vy / speed
+    ahead, aside = dx * ux + dy * uy - body.stride, dy * ux - dx * uy - side
+    return float(0.5 * (ahead**2 / (0.15**2 + 0.2 * body.pp) + aside**2 / (0.1**2 + 0.2 * body.pp)) + 2.4)
+
+
+@njit(cache=True)
+def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float, dt: float) -> float:
+    """The same of a foot that has moved by (dx, dy) in dt s: it goes straight on (u, v m/s), or begins to swing."""
+    pace = np.hypot(u, v)
+    if pace > 0.4:
+        along, aside = (dx * u + dy * v) / pace, (dy * u - dx * v) / pace
+        over = max(-along, along - pace * dt - 2.5 * dt, 0.0)
+        wide = 0.045 + 0.2 * dt
+        return float(0.5 * (aside / wide) ** 2 + 0.5 * (over / 0.06) ** 2 + 1.7)
+    reach = 3.0 * max(speed, 0.4) * dt
+    if speed > 0.3:
+        ux, uy = body.vx / speed, body.vy / speed
+        along = min(max(dx * ux + dy * uy, 0.0), reach)
+        dx, dy = dx - along * ux, dy - along * uy
+    else:
+        away = np.hypot(dx, dy)
+        share = max(away - reach, 0.0) / max(away, 1e-6)
+        dx, dy = dx * share, dy * share
+    return float(0.5 * (dx * dx + dy * dy) / 0.1**2 + 2.5)
+
+
+@njit(cache=True)
+def costs(
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    prints: Any,
+    bodies: Any,
+    rows: NDArray[np.int64],
+    t: float,
+    cost: Array,
+) -> None:
+    """Fill ``cost`` (m, 2k + m): negative log likelihoods of the clusters (m,) being feet of the bodies ``rows`` (k,).
+
+    A foot goes on standing where it stood, or it has stepped: then it lands near the body. Only a fresh print can be
+    a step: what has stood there for long is no foot. The last m columns are for clusters that are nobody's: a fresh
+    one is somebody new, which is rare; an old one may well be something that was put down.
+    """
+    m, k = clusters.size, rows.size
+    for i in range(m):
+        c = clusters[i]
+        cost[i, :] = UNLIKELY
+        q = prints[of[i]] if of[i] >= 0 else prints[0]
+        age = t - q.first if of[i] >= 0 else 0.0
+        cost[i, 2 * k + i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
+        if age > _FRESH_S and c.width < WIDE_M and not narrow(c) and not c.attached:
+            # What was nobody's stays nobody's.
+            stands = False
+            for column in range(k):
+                body = bodies[rows[column]]
+                stands = stands or body.a_print == of[i] or body.b_print == of[i]
+                part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
+                stands = stands or part
+            if not stands:
+                cost[i, 2 * k + i] = _RESTS
+        if not free[i]:
+            continue
+        for column in range(k):
+            body = bodies[rows[column]]
+            away = np.hypot(c.x - body.x, c.y - body.y)
+            if body.stale and age > _FRESH_S:
+                continue
+            if not body.confirmed and age > t - body.first + 0.25:
+                continue
+            if away > _REACH_M + 1.5 * np.sqrt(body.pp):
+                continue
+            if body.robot or body.wide > 0.6:
+                if away > 1.0:
+                    continue
+                # Part of it may be hidden, but what is narrow and all in view is somebody's foot.
+                cost[i, 2 * column] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > 0.6 * body.width else 6.0)
+                continue
+            speed = np.hypot(body.vx, body.vy)
+            base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
+            shape = unlike(body, marks[i, 0], marks[i, 1])
+            if c.width > WIDE_M:
+                shape += 3.0
+                if c.width > _BROAD_M and body.hits > 15:
+                    shape += 5.0 * max(0.0, 1.0 - 3.0 * body.wide)
+            elif narrow(c):
+                shape += 2.0 if c.n == 1 else 6.0
+            if c.attached:
+                shape += 4.0
+            anywhere = (
+                _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
+            )
+            anywhere = min(anywhere, 0.5 * away * away / (0.45**2 + body.pp) + 5.2)
+            if age > 0.5:
+                anywhere += 1.0
+            for which in range(2):
+                if which == 0:
+                    x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
+                    ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
+                    left = t - body.a_since > _LEFT_S and t - body.b_since < _FRESH_S
+                else:
+                    x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
+                    ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
+                    left = t - body.b_since > _LEFT_S and t - body.a_since < _FRESH_S
+                gap = t - seen
+                off = (c.x - x) ** 2 + (c.y - y) ** 2
+                value = UNLIKELY
+                if standing >= 0 and standing == of[i]:
+                    value = base + min(0.5 * off / STAND_M**2, 2.0) + (_LEFT if left else 0.0)
+                elif gap < 1.0:
+                    value = base + 0.5 * off / STAND_M**2
+                if body.shoe >= SHOES:
+                    if gap < 0.35:
+                        value = min(value, base + 0.5 * off / _ROLL_M**2 + 1.0 if off < _ROLLED_M**2 else UNLIKELY)
+                elif gap < 0.35:
+                    swing = base + _swinging(c.x - x, c.y - y, u, v, body, speed, gap)
+                    if swings > 0.5 and t - other < 0.22:
+                        swing += _BOTH
+                    value = min(value, swing)
+                step = anywhere
+                if gap < 0.22 and not left:
+                    # Seen just now, it cannot be far, unless it was something that was left behind.
+                    step += _SEEN + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / 0.1) ** 2
+                elif left:
+                    step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
+                elif gap > 1.0:
+                    # It must be somewhere.
+                    step -= 1.0
+                if age > gap + 0.15:
+                    # Whatever stands here came while this foot was somewhere else.
+                    step += _STOLEN
+                if age >= _FRESH_S and q.owner != rows[column]:
+                    # What has stood there for long is hardly a foot, except that of somebody who stands.
+                    value = min(value, step + 2.5)
+                else:
+                    value = min(value, step)
+                    if speed > 0.35 and gap < 1.3 and t - other < 0.4:
+                        side = body.side if which == 0 else -body.side
+                        value = min(value, _landing(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
+                cost[i, 2 * column + which] = shape + value
+    # Both feet in one cluster: whatever else is near is not a foot of this body.
+    for column in range(k):
+        body = bodies[rows[column]]
+        for i in range(m):
+            if free[i] and together(body, clusters, i, t):
+                for o in range(m):
+                    if o != i:
+                        cost[o, 2 * column] += 4.0
+                        cost[o, 2 * column + 1] += 4.0
+                break
+
+
+@njit(cache=True)
+def _beside(body: Any, bodies: Any) -> bool:
+    """Whether a mover that is believed is so near that its feet may be taken for another body."""
+    for b in range(bodies.size):
+        other = bodies[b]
+        if other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6:
+            return True
+    return False
+
+
+@njit(cache=True)
+def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
+    """Lower the ``cost`` (m, m) of being nobody's of clusters that go on with somebody new who is not believed yet."""
+    for i in range(clusters.size):
+        c = clusters[i]
+        for b in range(bodies.size):
+            body = bodies[b]
+            if body.used and not body.confirmed and t - body.seen < 0.5 and not _beside(body, bodies):
+                near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
+                near = max(min(near, np.hypot(c.x - body.x, c.y - body.y)) - 0.1, 0.0)
+                cost[i, i] = min(cost[i, i], _TENTATIVE + 0.5 * (near / 0.2) ** 2)
