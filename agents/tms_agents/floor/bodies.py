@@ -219,3 +219,17 @@ def _stride(body: Any, dx: float, dy: float, speed: float, sign: float) -> None:
     if 0.2 < ahead < 1.0 and abs(aside) < 0.4:
         body.stride += 0.25 * (ahead - body.stride)
         body.side += 0.25 * (sign * aside - body.side)
+
+
+def stuck(body: Any, t: float) -> tuple[float, float, float] | None:
+    """Where and when (x, y, t) the other foot was last seen, if all that is seen of a person is one thing that stands.
+
+    It may be what was put down, and the person has gone on.
+    """
+    a, b = t - body["a_seen"] < 0.5, t - body["b_seen"] < 0.5
+    if body["robot"] or a == b or body["stale"]:
+        return None
+    if t - (body["a_since"] if a else body["b_since"]) < 0.8:
+        return None
+    foot = "b" if a else "a"
+    return float(body[f"{foot}x"]), float(body[f"{foot}y"]), float(body[f"{foot}_seen"])

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.association import Association
-from tms_agents.floor.bodies import misled
+from tms_agents.floor.bodies import misled, stuck
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.masks import Area
@@ -369,7 +369,7 @@ class Tracks:
                 continue
             x, y, seen = float(other["x"]), float(other["y"]), float(other["seen"])
             if seen > body["first"] + 0.2:
-                lost = _stuck(other, float(body["seen"]))
+                lost = stuck(other, float(body["seen"]))
                 if lost is None:
                     continue
                 x, y, seen = lost
@@ -382,20 +382,6 @@ class Tracks:
             if gap / reach < best_gap:
                 best, best_gap = other, gap / reach
         return best
-
-
-def _stuck(body: Any, t: float) -> tuple[float, float, float] | None:
-    """Where and when (x, y, t) the other foot was last seen, if all that is seen of a person is one thing that stands.
-
-    It may be what was put down, and the person has gone on.
-    """
-    a, b = t - body["a_seen"] < 0.5, t - body["b_seen"] < 0.5
-    if body["robot"] or a == b or body["stale"]:
-        return None
-    if t - (body["a_since"] if a else body["b_since"]) < 0.8:
-        return None
-    foot = "b" if a else "a"
-    return float(body[f"{foot}x"]), float(body[f"{foot}y"]), float(body[f"{foot}_seen"])
 
 
 def _told(body: Any, t: float) -> None:
