@@ -30,8 +30,8 @@ class ScipLaser(Line):
     skip: Annotated[int, Field(ge=0, le=9)] = 0
     #: Ranges up to 4 m in fewer bytes, for slow serial lines.
     short: bool = False
-    #: Have the strength of the echoes sent, too, by a model that tells it.
-    intensity: bool = False
+    #: Have the strength of the echoes sent, too, by a model that tells it: it tells people apart.
+    intensity: bool = True
 
     default_port: ClassVar[int | None] = 10940
 
@@ -41,7 +41,7 @@ class ScipLaser(Line):
         return self
 
     def _settings(self) -> ScipSettings:
-        intensity: Literal["auto", "off"] = "auto" if self.intensity else "off"
+        intensity: Literal["auto", "off"] = "auto" if self.intensity and not self.short else "off"
         return ScipSettings(intensity, self.angle_min, self.angle_max, self.cluster, self.skip, self.short)
 
     def link(self, silent_after_s: float) -> Link[Scan]:
@@ -91,6 +91,8 @@ class ColaLaser(Section):
     frequency_hz: Annotated[float, Field(gt=0, le=200)] | None = None
     resolution_deg: Annotated[float, Field(gt=0, le=10)] | None = None
     layer: Annotated[int, Field(ge=-100, le=100)] = 0
+    #: Have the strength of the echoes sent, too: it tells people apart. None: as the device is set up, without login.
+    intensity: bool | None = True
 
     @model_validator(mode="after")
     def _possible(self) -> ColaLaser:
@@ -100,7 +102,7 @@ class ColaLaser(Section):
     def _session(self) -> ColaSession:
         return ColaSession(
             dialect=self.dialect,
-            intensities=None,
+            intensities=self.intensity,
             frequency_hz=self.frequency_hz,
             resolution_deg=self.resolution_deg,
             forward_deg=self.forward_deg,
