@@ -16,8 +16,6 @@ from numba import njit
 _SWING_M, _STANCE_M = 0.05, 0.12
 #: A shoe seems to move so far (m) when it rolls off. Of such a share of wide feet somebody's shoes are seen, not legs.
 _ROLL_M, SHOES, _SHOE_M = 0.17, 0.3, (0.16, 0.34)
-#: Scans resemble each other: variance of one, as a multiple of that of a sighting alone.
-_ALIKE = 1.0
 NOTHING = (0.0, 0.0, np.inf, 0.0, 0.0, np.inf)
 
 
@@ -98,7 +96,7 @@ def middle(body: Any, t: float) -> tuple[float, float, float, float, float, floa
         swap(body)
         return found
     if a and b:
-        return 0.5 * (body.ax + body.bx), 0.5 * (body.ay + body.by), _ALIKE * 0.2**2, 0.0, 0.0, np.inf
+        return 0.5 * (body.ax + body.bx), 0.5 * (body.ay + body.by), 0.2**2, 0.0, 0.0, np.inf
     if b:
         swap(body)
         found = middle(body, t)
@@ -108,7 +106,7 @@ def middle(body: Any, t: float) -> tuple[float, float, float, float, float, floa
         up = t - body.a_stood
         sx, sy = body.ax - body.a_late * body.a_vx, body.ay - body.a_late * body.a_vy
         return _passing(body.b_px, body.b_py, sx, sy, body.a_vx, body.a_vy, up, 0.16)
-    return body.ax, body.ay, _ALIKE * 0.25**2, 0.0, 0.0, np.inf
+    return body.ax, body.ay, 0.25**2, 0.0, 0.0, np.inf
 
 
 @njit(cache=True)
@@ -124,9 +122,9 @@ def _astride(body: Any, t: float) -> tuple[float, float, float, float, float, fl
         share = -0.4 + 0.8 * age
         noise = 0.08 + 0.2 * age
         vx, vy, slow = _going(dx, dy, qx - ox, qy - oy)
-        return qx + share * dx, qy + share * dy, _ALIKE * noise * noise, vx, vy, _ALIKE * slow
+        return qx + share * dx, qy + share * dy, noise * noise, vx, vy, slow
     noise = max(0.05, 0.17 - 0.1 * (age - 0.3))
-    return qx - 0.5 * dx, qy - 0.5 * dy, _ALIKE * noise * noise, 0.0, 0.0, _ALIKE * 0.4**2
+    return qx - 0.5 * dx, qy - 0.5 * dy, noise * noise, 0.0, 0.0, 0.4**2
 
 
 @njit(cache=True)
@@ -147,10 +145,10 @@ def _passing(
     dx, dy = sx - qx, sy - qy
     x, y = qx + share * dx + lead * u, qy + share * dy + lead * v
     if up < 0.15 or up > 0.7:
-        return x, y, _ALIKE * noise * noise, 0.0, 0.0, np.inf
+        return x, y, noise * noise, 0.0, 0.0, np.inf
     fast, far = max(0.3 - (up - 0.2), 0.18), min(0.13 + 3.5 * (up - 0.2), 0.67)
     slow = 0.25 + max(0.0, 0.6 * (0.3 - up)) + max(0.0, up - 0.4)
-    return x, y, _ALIKE * noise * noise, fast * u + far * dx, fast * v + far * dy, _ALIKE * slow * slow
+    return x, y, noise * noise, fast * u + far * dx, fast * v + far * dy, slow * slow
 
 
 @njit(cache=True)
@@ -160,14 +158,14 @@ def _alone(body: Any, t: float) -> tuple[float, float, float, float, float, floa
     dx, dy = body.a_px - body.b_px, body.a_py - body.b_py
     if gone > 1.5 or np.hypot(dx, dy) > 1.2:
         # Both legs may be one thing to the laser: it goes as the body goes.
-        return body.ax, body.ay, _ALIKE * 0.1**2, 0.0, 0.0, np.inf
+        return body.ax, body.ay, 0.1**2, 0.0, 0.0, np.inf
     if body.a_land < body.b_land:
         # The other had landed later and is up again: this one may be a foot that waits.
-        return body.a_px - 0.3 * dx, body.a_py - 0.3 * dy, _ALIKE * 0.18**2, 0.0, 0.0, np.inf
+        return body.a_px - 0.3 * dx, body.a_py - 0.3 * dy, 0.18**2, 0.0, 0.0, np.inf
     share = min(-0.36 + 1.05 * age, 0.15)
     noise = 0.08 + 0.3 * age
     vx, vy, slow = 0.0, 0.0, np.inf
     if age < 0.4:
         vx, vy, slow = _going(dx, dy, body.a_px - body.a_ox, body.a_py - body.a_oy)
         slow *= 1.0 + 4.0 * age
-    return body.a_px + share * dx, body.a_py + share * dy, _ALIKE * noise * noise, vx, vy, _ALIKE * slow
+    return body.a_px + share * dx, body.a_py + share * dy, noise * noise, vx, vy, slow
