@@ -234,7 +234,7 @@ class CabinetEstimator:
         odd = fits_none(best, step, self._namer.loose())
         if self._settings.knows_places and (odd or (best.several and best.kind != "slide")):
             if waited < self._settings.stubborn_s:
-                return self._by_verdict(step)
+                return self._by_verdict(step, steady)
             if steady < _VERDICT_S:
                 self._detector.ignore(step)
                 return []
@@ -253,10 +253,9 @@ class CabinetEstimator:
             self._book.doubt(step, best, others)
         return self._take(step, best)
 
-    def _by_verdict(self, step: Step) -> list[CabinetEvent]:
+    def _by_verdict(self, step: Step, steady: float) -> list[CabinetEvent]:
         """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
-        waited = step.now - self._plateau.since(step)
-        outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if waited >= _VERDICT_S else None
+        outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if steady >= _VERDICT_S else None
         if outcome is None:
             self._detector.hold(step)
             return []

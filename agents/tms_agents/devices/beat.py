@@ -19,13 +19,13 @@ BEAT_S = 0.02
 _QUARTERS = 4
 
 
-def _offsets(groups: int) -> tuple[float, ...]:
-    chance = random.Random(1960)
+def _offsets(groups: int, chance: random.Random) -> tuple[float, ...]:
     return tuple(q / _QUARTERS for _ in range(groups) for q in chance.sample(range(_QUARTERS), _QUARTERS))
 
 
-#: Where in its period each moment is, again and again: 41 s at 50 Hz.
-_OFFSETS = _offsets(512)
+#: Where in its period each moment is, again and again: 41 s at 50 Hz. A table, the same in every process: all must
+#: wait for the same moments.
+_OFFSETS = _offsets(512, random.Random(1960))
 #: A timer that rings so much of a period early is on the beat.
 _EARLY = 1e-3
 

@@ -21,9 +21,8 @@ Array = NDArray[np.float64]
 #: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and than its parent's best.
 _KEPT, _WORSE, _BRANCH = 12, 14.0, 7.0
 _CHILDREN = 48
-#: Bodies so near each other (m, each axis), on the same prints, are at the same place.
-_NEAR_M = 0.08
-_ALIKE = 0.3
+#: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
+_NEAR_M, _ALIKE = 0.08, 0.3
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.

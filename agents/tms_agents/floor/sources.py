@@ -91,8 +91,9 @@ class ColaLaser(Section):
     frequency_hz: Annotated[float, Field(gt=0, le=200)] | None = None
     resolution_deg: Annotated[float, Field(gt=0, le=10)] | None = None
     layer: Annotated[int, Field(ge=-100, le=100)] = 0
-    #: Have the strength of the echoes sent, too: it tells people apart. None: as the device is set up, without login.
-    intensity: bool | None = True
+    #: Have the strength of the echoes sent, too: it tells people apart. For that the agent logs in with the passwords
+    #: that devices come with; false: the device stays as it is set up, without login.
+    intensity: bool = True
 
     @model_validator(mode="after")
     def _possible(self) -> ColaLaser:
@@ -102,7 +103,7 @@ class ColaLaser(Section):
     def _session(self) -> ColaSession:
         return ColaSession(
             dialect=self.dialect,
-            intensities=self.intensity,
+            intensities=True if self.intensity else None,
             frequency_hz=self.frequency_hz,
             resolution_deg=self.resolution_deg,
             forward_deg=self.forward_deg,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from floor_rig import PUT_AT, QUICK, Room, laser_toml
 
 from tms_agents.devices.cola import ColaDevice
-from tms_agents.devices.cola.emulator import MODELS
+from tms_agents.devices.cola.emulator import MODELS, ColaModel
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.lms200 import Lms200Device
 from tms_agents.devices.scans import Sweep
@@ -25,10 +26,10 @@ def seen(room: Room, beams: int, span_deg: float):
 
 
 @contextlib.asynccontextmanager
-async def cola(room: Room, model: str, dialect):
-    device = ColaDevice(lambda: seen(room, 811, 270.0), model=MODELS[model], dialect=dialect)
+async def cola(room: Room, model: ColaModel, dialect, more: str = ""):
+    device = ColaDevice(lambda: seen(room, 811, 270.0), model=model, dialect=dialect)
     async with TcpLine(device, tick_s=0.01) as line:
-        yield device, laser_toml(f'{{ kind = "cola", host = "127.0.0.1", port = {line.port} }}', POSE)
+        yield device, laser_toml(f'{{ kind = "cola", host = "127.0.0.1", port = {line.port}{more} }}', POSE)
 
 
 @contextlib.asynccontextmanager
@@ -42,8 +43,8 @@ async def lms200(room: Room):
 @pytest.mark.parametrize(
     ("open_", "told"),
     [
-        (lambda room: cola(room, "TiM571", "B"), "CoLa laser"),
-        (lambda room: cola(room, "LMS111", "A"), "CoLa laser"),
+        (lambda room: cola(room, MODELS["TiM571"], "B"), "CoLa laser"),
+        (lambda room: cola(room, MODELS["LMS111"], "A"), "CoLa laser"),
         (lms200, "LMS2xx"),
     ],
     ids=["TiM571", "LMS111", "LMS200"],
@@ -69,3 +70,13 @@ async def test_a_thing_put_down_and_taken_again(rig, open_, told):
             assert await floor.labels("mover") == {}
     assert device.power_cycles == 1
     assert floor.town.anomalies(floor.name).anomalies == []
+
+
+async def test_a_laser_whose_password_was_changed(rig):
+    """It says so; as it is set up, without login, it works."""
+    room, locked = Room(), replace(MODELS["TiM571"], password=0x1234)
+    for more, state, why in (("", "faulty", "refuses the password"), (", intensity = false", "connected", "TiM571")):
+        async with cola(room, locked, "B", more) as (_, toml):
+            floor = rig(toml, more=QUICK)
+            async with floor.agent():
+                await floor.state(state, why, timeout_s=60.0)
