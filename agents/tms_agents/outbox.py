@@ -19,7 +19,7 @@ from tms_client.errors import SpoolError
 from tms_schemas.observation import Inventory, Observation
 
 log = logging.getLogger(__name__)
-_LOOK_S = 0.2
+_LOOK_S = 0.4
 _SAVE_S = 60.0
 #: After a device came back, what changed meanwhile has been told by then.
 _SETTLED_S = 2.0

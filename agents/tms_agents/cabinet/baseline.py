@@ -30,7 +30,7 @@ class Level:
         duration = block.end - block.start
         keep = max(0.0, 1.0 - duration / self._memory_s)
         mean, variance = block.sharp or (block.mean, block.variance)
-        weight = 1.0 / float(variance.mean())
+        weight = 1.0 / (float(np.add.reduce(variance)) / len(variance))
         self.weight = keep * self.weight + weight
         share = weight / self.weight
         self.mean = self.mean + share * (mean - self.mean)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from tms_agents.cabinet.settings import EstimatorSettings
 _REPEAT_START, _REPEAT_LEAST, _REPEAT_MOST = 0.5, 0.15, 0.999
 #: A run of the same value that is so improbable (negative log) is suspect, though the cell may still be alive.
 _SUSPECT = 3.0
+_NOTHING: Array = np.empty(0)
 
 
 @dataclass(slots=True)
@@ -44,6 +46,7 @@ class Blocks:
     def __init__(self, cells: int, settings: EstimatorSettings) -> None:
         self.unusable: tuple[int, ...] = ()
         self._settings, self._cells = settings, cells
+        self._patience = -math.log(settings.stuck_probability)
         self._samples: list[list[float]] = []
         self._start = 0.0
         self._before: deque[list[float]] = deque(maxlen=2)
@@ -53,9 +56,9 @@ class Blocks:
         #: When each cell began to show its last value.
         self._same_since = [math.inf] * cells
 
-    def push(self, t: float, grams: Array) -> tuple[Block, Array] | None:
+    def push(self, t: float, grams: Sequence[float] | Array) -> tuple[Block, list[list[float]]] | None:
         """Take one sample (k,); a finished block, and its samples (n + 2, k) with the two before them."""
-        values = grams.tolist()
+        values = grams.tolist() if isinstance(grams, np.ndarray) else list(grams)
         self.unusable = self._check(t, values)
         if self.unusable:
             self._samples.clear()
@@ -65,14 +68,14 @@ class Blocks:
             self._start = t
         self._samples.append(values)
         # Half a period early, so that jitter of the sampling does not make every second block one sample longer.
-        period = (t - self._start) / max(len(self._samples) - 1, 1)
-        if t - self._start + 1.5 * period < self._settings.block_s and t >= self._start:
+        lasts, n = t - self._start, len(self._samples)
+        if lasts + 1.5 * (lasts / max(n - 1, 1)) < self._settings.block_s and lasts >= 0:
             return None
-        samples = np.array([*self._before, *self._samples])
-        own = samples[-len(self._samples) :]
-        block = Block(self._start, t, len(own), np.mean(own, axis=0), np.empty(0), own, np.empty(0))
+        own = np.array(self._samples)
+        block = Block(self._start, t, n, np.add.reduce(own, axis=0) / n, _NOTHING, own, _NOTHING)
+        samples = [*self._before, *self._samples]
         self._before.extend(self._samples[-2:])
-        self._samples.clear()
+        self._samples = []
         return block, samples
 
     def frozen(self, since: float) -> bool:
@@ -85,27 +88,28 @@ class Blocks:
     def _check(self, t: float, values: list[float]) -> tuple[int, ...]:
         if len(values) != self._cells:
             raise ValueError(f"{len(values)} values for {self._cells} cells")
-        settings, bad = self._settings, []
-        patience = -math.log(settings.stuck_probability)
-        together, shortest = 0.0, 1 << 30
+        limit, patience = self._settings.cell_limit_g, self._patience
+        bad: list[int] = []
+        repeated: list[float] = []  # how surprising that was, of each cell that did
         for i, value in enumerate(values):
-            if not math.isfinite(value) or abs(value) > settings.cell_limit_g:
+            if not -limit <= value <= limit:
                 bad.append(i)
                 self._run[i] = 0
                 self._last[i] = math.nan
-                shortest = 0
-                continue
-            run = self._run[i] = self._run[i] + 1 if value == self._last[i] else 0
-            self._last[i] = value
-            if not run:
+            elif value != self._last[i]:
+                self._run[i] = 0
+                self._last[i] = value
                 self._same_since[i] = t
-            surprise = _surprise(self._repeat[i])
-            together, shortest = together + surprise, min(shortest, run)
-            if run * surprise > patience:
-                bad.append(i)
-            elif run * surprise < 0.5 * patience:  # a cell that is perhaps stuck teaches nothing about its noise
-                self._repeat[i] += 0.003 * ((run > 0) - self._repeat[i])
-        if shortest * together > patience:
+                self._repeat[i] -= 0.003 * self._repeat[i]
+            else:
+                run = self._run[i] = self._run[i] + 1
+                surprise = _surprise(self._repeat[i])
+                repeated.append(surprise)
+                if run * surprise > patience:
+                    bad.append(i)
+                elif run * surprise < 0.5 * patience:  # a cell that is perhaps stuck teaches nothing about its noise
+                    self._repeat[i] += 0.003 * (1 - self._repeat[i])
+        if len(repeated) == self._cells and min(self._run) * sum(repeated) > patience:
             return tuple(range(self._cells))
         return tuple(bad)
 

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tms_agents.cabinet import CabinetEstimator, CabinetEvent, KnownWeight
 from tms_agents.cabinet.calibration_file import BoardCalibration
@@ -43,7 +42,7 @@ class Board:
         self._good_at: float | None = None
         self._bad_at = float("-inf")
         #: Grams of every cell of the device at the last sample, NaN where unusable.
-        self.grams: NDArray[np.float64] = np.full(section.cell_count, np.nan)
+        self.grams = [math.nan] * section.cell_count
 
     @property
     def name(self) -> str:
@@ -63,7 +62,7 @@ class Board:
         if state.state != "connected":
             self._continuity.interrupted()
             self.estimator.load(t, np.full(self.geometry.count, np.nan))
-            self.grams = np.full_like(self.grams, np.nan)
+            self.grams = [math.nan] * len(self.grams)
             self._fault, self._good_at = "", None
         self._link = state
 
@@ -73,7 +72,7 @@ class Board:
         if count != len(self.grams):
             self._failing(t, f"{count} values for {len(self.grams)} cells")
             return []
-        raw = np.array(sample.values, float) if self.calibration is None else self.calibration.grams(sample.values)
+        raw = list(sample.values) if self.calibration is None else self.calibration.grams(sample.values)
         grams = self._continuity.take(t, raw)
         if grams is None:
             return []
@@ -101,12 +100,12 @@ class Board:
         self._continuity.restore(saved["zero"]["shift"], saved["zero"]["level"])
         self.estimator = estimator
 
-    def _for_estimator(self, grams: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _for_estimator(self, grams: list[float]) -> list[float]:
         if self.section.cells is None:
             grams = single_loads(grams)
         if self._filtered or self.section.cells is None:
             self._dither = -self._dither
-            grams = grams + self._dither
+            grams = [one + self._dither for one in grams]
         return grams
 
     def _judge(self, t: float, sample: LoadSample) -> None:
@@ -129,7 +128,7 @@ class Board:
 
     def _unusable(self) -> list[int]:
         """Cells that deliver nothing or the same number for too long."""
-        bad = {cell for cell, grams in enumerate(self.grams.tolist()) if not math.isfinite(grams)}
+        bad = {cell for cell, grams in enumerate(self.grams) if not math.isfinite(grams)}
         if not self._filtered and self.section.cells is not None:
-            bad |= set(self.estimator.unusable_cells)
+            bad.update(self.estimator.unusable_cells)
         return sorted(bad)

@@ -52,10 +52,9 @@ class BoardCalibration(Section):
             measured_at=measured_at,
         )
 
-    def grams(self, counts: Sequence[float]) -> NDArray[np.float64]:
-        """Shape (k,); NaN stays NaN."""
-        grams: NDArray[np.float64] = (np.array(counts) - np.array(self.offset)) * np.array(self.gain)
-        return grams
+    def grams(self, counts: Sequence[float]) -> list[float]:
+        """One per cell; NaN stays NaN."""
+        return [(one - offset) * gain for one, offset, gain in zip(counts, self.offset, self.gain, strict=True)]
 
 
 def read_calibration(path: Path) -> dict[str, BoardCalibration]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +35,11 @@ class Continuity:
             small_g,
             memory_s,
         )
-        #: Grams added to each cell, shape (k,).
-        self.shift: Floats = np.zeros(cells)
+        #: Grams added to each cell.
+        self.shift = [0.0] * cells
         self._level: Floats | None = None
-        self._late: deque[tuple[float, Floats]] = deque()
-        self._held: list[Floats] = []
+        self._late: deque[tuple[float, list[float]]] = deque()
+        self._held: list[Sequence[float]] = []
         self._held_since: float | None = None
         self._waiting = False
 
@@ -52,10 +54,10 @@ class Continuity:
         self._late.clear()
         self._waiting, self._held, self._held_since = True, [], None
 
-    def take(self, t: float, grams: Floats) -> Floats | None:
-        """Corrected grams; None while held back. Samples with NaN pass as they are."""
-        if not np.isfinite(grams).all():
-            return grams + self.shift
+    def take(self, t: float, grams: Sequence[float]) -> list[float] | None:
+        """Corrected grams of every cell; None while held back. Samples with NaN pass as they are."""
+        if not all(map(math.isfinite, grams)):
+            return list(map(add, grams, self.shift))
         if self._waiting:
             if self._held_since is None:
                 self._held_since = t
@@ -64,9 +66,11 @@ class Continuity:
             if long < self._settle_s or (len(self._held) < _FEW and long < _SLOW_S):
                 return None
             self._resume(np.median(self._held, axis=0))
-        grams = grams + self.shift
-        self._follow(t, grams)
-        return grams
+        corrected = list(map(add, grams, self.shift))
+        self._late.append((t, corrected))
+        while t - self._late[0][0] > self._memory_s:
+            self._late.popleft()
+        return corrected
 
     def _resume(self, now: Floats) -> None:
         self._waiting, self._held = False, []
@@ -77,16 +81,11 @@ class Continuity:
         # Zeros jump each for itself, up and down; a thing loads all cells in the same direction.
         drifted = np.abs(jump).max() <= self._small_g and abs(jump.sum()) <= _SMALL_SUM_G
         if drifted or (self._zeroes_itself and np.abs(now).max() <= self._small_g):
-            self.shift = level - now
-
-    def _follow(self, t: float, grams: Floats) -> None:
-        self._late.append((t, grams))
-        while t - self._late[0][0] > self._memory_s:
-            self._late.popleft()
+            self.shift = (level - now).tolist()
 
     def to_dict(self) -> dict[str, list[float] | None]:
         level = self.level
-        return {"shift": self.shift.tolist(), "level": None if level is None else level.tolist()}
+        return {"shift": self.shift, "level": None if level is None else level.tolist()}
 
     def restore(self, shift: Sequence[float], level: Sequence[float] | None) -> None:
         """Go on from a former run: the device may have been switched off since.
@@ -96,7 +95,7 @@ class Continuity:
         """
         if len(shift) != len(self.shift) or (level is not None and len(level) != len(self.shift)):
             raise ValueError("another number of cells")
-        self.shift = np.array(shift, dtype=float)
+        self.shift = [float(one) for one in shift]
         self._late.clear()
         self._level = None if level is None else np.array(level, dtype=float)
         self.interrupted()

@@ -26,8 +26,9 @@ from tms_schemas.observation import Inventory, Observation, RawRead
 
 log = logging.getLogger(__name__)
 _STORY = 100
-#: Samples of a board at rest are taken so many seconds at a time: five at once cost little more than one.
-_PATIENCE_S = 0.1
+#: Samples of a board at rest are taken so many seconds at a time: ten at once cost little more than one. A load must be
+#: steady for much longer than that to be told of, so nothing is told later for it.
+_PATIENCE_S = 0.2
 
 
 class Reader:
@@ -119,6 +120,11 @@ class Cabinet:
                 if isinstance(item, RoundEnd):
                     one.turns.round_over(now)
         return self._rounds(one, rounds)
+
+    @property
+    def ticks(self) -> bool:
+        """Whether ``tick`` is needed: for readers that do not tell the end of their rounds, or take turns."""
+        return any(one.turns is not None or not one.rounds.tells_ends for one in self.readers.values())
 
     def tick(self) -> tuple[list[Observation], set[str]]:
         """To be called ten times a second or so."""

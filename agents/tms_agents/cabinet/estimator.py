@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -82,7 +82,7 @@ class CabinetEstimator:
 
     # --- input
 
-    def load(self, t: float, grams: Array) -> list[CabinetEvent]:
+    def load(self, t: float, grams: Sequence[float] | Array) -> list[CabinetEvent]:
         """Take one sample: calibrated grams per cell, (k,); NaN where a cell is unusable now.
 
         Raises:

@@ -52,16 +52,21 @@ class Loudness:
         stay = float(np.exp(-max(period_s, 1e-3) / _LASTING_S))
         jump = (1.0 - stay) * self._usual
         probability = np.empty((n, len(_FACTORS)))
-        now = self._usual
-        for i in range(n):
-            now = (stay * now + jump) * likelihood[i]
-            now = now / now.sum()
-            probability[i] = now
+        # In place: there are many of these small steps.
+        now = self._usual.copy()
+        for row, likely in zip(probability, likelihood, strict=True):
+            now *= stay
+            now += jump
+            now *= likely
+            now /= np.add.reduce(now)
+            row[:] = now
         later = np.ones(len(_FACTORS))
         for i in range(n - 2, -1, -1):
-            later = later * likelihood[i + 1]
-            later = stay * later + jump @ later
-            later /= later.sum()
+            later *= likelihood[i + 1]
+            leap = jump @ later
+            later *= stay
+            later += leap
+            later /= np.add.reduce(later)
             probability[i] *= later
         probability /= probability.sum(axis=1, keepdims=True)
         share = min(_LEARNING * n, 0.5)

@@ -36,7 +36,7 @@ class Rounds:
         self._zones, self._rest, self._window_s = dict(zones), rest, window_s
         self._tags: dict[int, set[str]] = {}
         self._done: dict[str, dict[int, frozenset[str]]] = {}
-        self._tells_ends = tells_ends
+        self.tells_ends = tells_ends
         self._window_end: float | None = None
 
     def take(self, t: float, items: Sequence[TagItem]) -> list[Round]:
@@ -53,7 +53,7 @@ class Rounds:
 
     def tick(self, t: float, delivering: bool) -> list[Round]:
         """For readers without ends of rounds: call now and then; nothing is told of a reader that does not deliver."""
-        if self._tells_ends:
+        if self.tells_ends:
             return []
         if not delivering or self._window_end is None:
             self._window_end = t + self._window_s

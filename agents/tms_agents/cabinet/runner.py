@@ -92,7 +92,8 @@ class _Work:
                 tasks.create_task(listen_to_board(self._cabinet, board, self._found, self._outbox.came_back))
             for reader in self._config.readers:
                 tasks.create_task(listen_to_reader(self._cabinet, reader, self._found))
-            tasks.create_task(tick(self._cabinet, self._found))
+            if self._cabinet.ticks:
+                tasks.create_task(tick(self._cabinet, self._found))
             for work in (self._outbox.work, self._learn_weights):
                 tasks.create_task(work())
             tasks.create_task(

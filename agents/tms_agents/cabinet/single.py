@@ -5,8 +5,7 @@ Position then is always the middle, whatever the estimator says of it; how far o
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
 from tms_agents.cabinet.geometry import Covariance, Geometry
 
@@ -16,9 +15,9 @@ def single_geometry(width: float, depth: float) -> Geometry:
     return Geometry(((width / 2, depth / 2), (0.0, 0.0), (width, 0.0)), width, depth)
 
 
-def single_loads(grams: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Shape (1,) -> (3,)."""
-    return np.array([grams[0], 0.0, 0.0])
+def single_loads(grams: Sequence[float]) -> list[float]:
+    """Of one cell -> of three."""
+    return [grams[0], 0.0, 0.0]
 
 
 def anywhere(width: float, depth: float) -> Covariance:

@@ -138,8 +138,8 @@ class StepDetector:
     def _departed(self) -> bool:
         blocks = list(self._recent)
         count = np.arange(1, len(blocks) + 1)[:, None]
-        means = np.cumsum([b.mean for b in reversed(blocks)], axis=0) / count - self.level.mean
-        variances = np.cumsum([b.variance for b in reversed(blocks)], axis=0) / count**2 + self.level.variance
+        means = np.add.accumulate(np.array([b.mean for b in reversed(blocks)])) / count - self.level.mean
+        variances = np.add.accumulate(np.array([b.variance for b in reversed(blocks)])) / count**2 + self.level.variance
         score = np.maximum(
             means.sum(axis=1) ** 2 / variances.sum(axis=1), (means**2 / variances).sum(axis=1) / self._whole_limit
         )

@@ -60,7 +60,8 @@ async def watch_devices(
     cabinet = Cabinet(config, calibrations, clocks, lambda: f"new/{next(numbers)}", saved)
     work = [asyncio.create_task(listen_to_board(cabinet, one)) for one in config.boards]
     work += [asyncio.create_task(listen_to_reader(cabinet, one)) for one in config.readers]
-    work.append(asyncio.create_task(tick(cabinet)))
+    if cabinet.ticks:
+        work.append(asyncio.create_task(tick(cabinet)))
     try:
         while not any(task.done() for task in work):
             yield view_of(cabinet, clocks, "devices")

@@ -7,6 +7,9 @@ with what white noise leaves of them. Only what happens near the resting level c
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,9 +35,9 @@ class Wobble:
         self.variance: Array = np.zeros(cells)
         self._cells = cells
         self._now = self._quiet = 0.0
-        self._group: list[tuple[Array, Array]] = []
-        self._means: deque[tuple[Array, Array]] = deque(maxlen=3 * max(_SCALES))
-        self._bends: list[deque[tuple[Array, Array, float]]] = [deque(maxlen=_BENDS) for _ in _SCALES]
+        self._group: list[tuple[list[float], list[float]]] = []
+        self._means: deque[tuple[list[float], list[float]]] = deque(maxlen=3 * max(_SCALES))
+        self._bends: list[deque[_Bend]] = [deque(maxlen=_BENDS) for _ in _SCALES]
 
     @property
     def shaking(self) -> bool:
@@ -56,26 +59,52 @@ class Wobble:
             self._means.clear()
             return
         for bends in self._bends:
-            while bends and t - bends[0][2] > _MEMORY_S:
+            while bends and t - bends[0].t > _MEMORY_S:
                 bends.popleft()
-        self._group.append((mean, white))
+        self._group.append((mean.tolist(), white.tolist()))
         if len(self._group) < _GROUP:
             return
-        means, whites = (np.array(values) for values in zip(*self._group, strict=True))
+        means, whites = zip(*self._group, strict=True)
+        self._means.append((_average(means), [one / _GROUP for one in _average(whites)]))
         self._group.clear()
-        self._means.append((means.mean(axis=0), whites.mean(axis=0) / _GROUP))
-        largest = np.zeros(self._cells)
+        largest = [0.0] * self._cells
         for scale, bends in zip(_SCALES, self._bends, strict=True):
             if len(self._means) >= 3 * scale:
-                newest = list(self._means)[-3 * scale :]
-                parts = np.array([mean for mean, _ in newest]).reshape(3, scale, -1).mean(axis=1)
-                noise = np.mean([white for _, white in newest], axis=0) / scale
-                bends.append(((parts[0] - 2 * parts[1] + parts[2]) ** 2 / 6, noise, t))
+                bends.append(_bend(list(self._means)[-3 * scale :], scale, t))
             if len(bends) >= _LEAST:
-                squares, noises = np.array([bend[0] for bend in bends]), np.array([bend[1] for bend in bends])
-                white = noises.mean(axis=0)
-                ratio = float(np.median((squares / noises).mean(axis=1))) / _BIAS
+                white_g2 = _average([bend.noises for bend in bends])
+                ratio = median([bend.ratio for bend in bends]) / _BIAS
                 if ratio > _CHANCE:
-                    own = np.median(squares, axis=0) / _BIAS_OF_ONE - white
-                    largest = np.maximum(largest, np.maximum(own, _SHARE * (ratio - 1) * white))
-        self.variance = _TOGETHER * largest
+                    for i, least in enumerate(white_g2):
+                        own = median([bend.squares[i] for bend in bends]) / _BIAS_OF_ONE - least
+                        largest[i] = max(largest[i], own, _SHARE * (ratio - 1) * least)
+        self.variance = _TOGETHER * np.array(largest)
+
+
+class _Bend(NamedTuple):
+    """Squares of a bend (g^2) and what white noise makes of them, cell by cell; their mean ratio; when."""
+
+    squares: list[float]
+    noises: list[float]
+    ratio: float
+    t: float
+
+
+def _bend(newest: Sequence[tuple[list[float], list[float]]], scale: int, t: float) -> _Bend:
+    thirds = [_average([mean for mean, _ in newest[i : i + scale]]) for i in range(0, 3 * scale, scale)]
+    noises = [one / scale for one in _average([white for _, white in newest])]
+    squares, ratio = [], 0.0
+    for x, y, z, noise in zip(*thirds, noises, strict=True):
+        second = x - 2 * y + z
+        squares.append(second * second / 6)
+        ratio += squares[-1] / noise
+    return _Bend(squares, noises, ratio / len(squares), t)
+
+
+def _average(rows: Sequence[Sequence[float]]) -> list[float]:
+    """Of each column."""
+    total = list(rows[0])
+    for row in rows[1:]:
+        for i, one in enumerate(row):
+            total[i] += one
+    return [one / len(rows) for one in total]

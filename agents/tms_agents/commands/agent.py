@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
+import gc
 import logging
 import sys
 from collections.abc import Callable, Coroutine, Sequence
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tms_agents.config import AgentConfig, read_config
+from tms_agents.devices import waiting
 from tms_agents.hand.config import HandConfig
 from tms_agents.hand.runner import Tally
 from tms_agents.hand.runner import run as run_hand
@@ -87,8 +88,10 @@ def _run(config: AgentConfig, work: Coroutine[Any, Any, P]) -> P:
     """Log to stderr, work until a signal, say at the end what was done."""
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
     logging.getLogger("httpx").setLevel(logging.WARNING)
+    gc.collect()
+    gc.freeze()  # what is loaded by now stays: no need to look through it again and again
     try:
-        posted = asyncio.run(until_signalled(work))
+        posted: P = waiting.run(until_signalled(work))
     except SpoolError as error:
         raise CommandError(str(error)) from error
     sys.stdout.write(f"{config.agent}: {posted.in_words()}\n")

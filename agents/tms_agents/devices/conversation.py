@@ -1,4 +1,4 @@
-"""One connection of a session, run by callbacks of the event loop: most turns wake nobody.
+"""One connection of a session, served while the event loop waits (``devices.waiting``): most turns wake nobody.
 
 A turn is: read what is there, let the session take it, tick it, send what it wants to say. Something to read makes a
 turn, and so does the time at which the session wants its next tick. Only readings, states and the end wake the task
@@ -13,8 +13,9 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from tms_agents.devices.beat import on_the_beat
-from tms_agents.devices.sessions import DeviceState, Noted, Paced, Polled, Session
+from tms_agents.devices.sessions import Asking, DeviceState, Noted, Paced, Polled, Session
 from tms_agents.devices.streams import Stream
+from tms_agents.devices.waiting import Watch, watch
 
 T = TypeVar("T")
 
@@ -44,15 +45,16 @@ class Conversation(Generic[T]):
         self._tick_s, self._gather_s = tick_s, gather_s
         self._paced = session if isinstance(session, Paced) else None
         self._polled = isinstance(session, Polled)
+        self._asking: Asking[T] | None = session if isinstance(session, Asking) else None
         self._noted, self._note = (session if isinstance(session, Noted) else None), ""
         self._heard: list[Sequence[T] | DeviceState] = []
         self._told_at, self._waiting = 0.0, 0
         self._well = self._urgent = False
         self._listener: asyncio.Future[None] | None = None
-        self._timer: asyncio.TimerHandle | None = None
-        self._due = self._alive_at = self._loop.time()
+        self._watch: Watch | None = None
+        self._alive_at = self._loop.time()
         self._frames = 0
-        self._running, self._over = False, False
+        self._over = False
         self._error: Exception | None = None
 
     def begin(self) -> None:
@@ -75,7 +77,7 @@ class Conversation(Generic[T]):
         self._told_at = self._loop.time()
         if not heard and self._error is not None:
             raise self._error
-        if not self._running and not self._over:
+        if self._watch is None and not self._over:
             self._run()
         return heard
 
@@ -85,48 +87,57 @@ class Conversation(Generic[T]):
         self._pause()
 
     def _run(self) -> None:
-        self._running = True
-        if not self._polled:
-            self._loop.add_reader(self._stream.fd, self._turn)
-        self._schedule(self._loop.time(), self._wait_s())
+        self._watch = watch(None if self._polled else self._stream.fd, self._turn)
+        self._schedule(self._watch, self._loop.time(), self._wait_s())
 
     def _pause(self) -> None:
-        if self._running and not self._polled:
-            self._loop.remove_reader(self._stream.fd)
-        self._running = False
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
 
-    def _turn(self) -> None:
-        now = self._loop.time()
+    def _turn(self, readable: bool) -> bool:
         try:
-            self._look(now)
+            now = self._loop.time()
+            if (asking := self._asking) is None:
+                self._take(now, self._stream.read() if readable or self._polled else None)
+            elif not (data := self._stream.read()):
+                asking.nothing_by(now)
+                self._take(now, data)
+            elif (question := asking.answered(data)) is None:
+                self._take(now, data)
+            else:
+                if question:
+                    self._stream.write(question)
+                if self._watch is not None and now < self._watch.due:
+                    return False
             if (wait_s := self._wait_s()) <= 0 and not self._over:
-                self._look(now)
+                self._take(now, self._stream.read())
                 wait_s = self._wait_s()
         except Exception as error:  # raised to the listener, whatever it is
             self._error = error
             self.end()
-        if self._over or self._waiting >= _MOST_WAITING:
+        if self._watch is None or self._waiting >= _MOST_WAITING:
             self._pause()
-            self._wake()
-            return
-        self._schedule(now, wait_s)
+            return self._wake()
+        self._schedule(self._watch, now, wait_s)
         if self._heard and (self._urgent or now - self._told_at >= self._gather_s() - _SHORTEST_TICK_S):
-            self._wake()
+            return self._wake()
+        return False
 
-    def _wake(self) -> None:
-        if self._listener is not None and not self._listener.done():
-            self._listener.set_result(None)
+    def _wake(self) -> bool:
+        if self._listener is None or self._listener.done():
+            return False
+        self._listener.set_result(None)
+        return True
 
-    def _look(self, now: float) -> None:
+    def _take(self, now: float, data: bytes | None) -> None:
         session = self._session
-        data = self._stream.read()
-        if data == b"":
+        items: Sequence[T] = ()
+        if data:
+            items = session.receive(data)
+        elif data is not None:
             self.end()
             return
-        items = session.receive(data) if data else ()
         if session.frames > self._frames:
             self._alive_at, self._frames = now, session.frames
             if session.ready and (not self._well or (self._noted is not None and self._noted.note != self._note)):
@@ -136,15 +147,20 @@ class Conversation(Generic[T]):
             self._well = False
             self._tell(states)
         if items:
-            self._waiting += len(items)
-            last = self._heard[-1] if self._heard else None
-            if isinstance(last, list):  # one group, so that the listener can tell how they lie in time
-                last += items
-            else:
-                self._heard.append(list(items))
+            self._add(items)
         session.tick()
+        if self._asking is not None and (items := self._asking.finished()):
+            self._add(items)
         if output := session.output():
             self._stream.write(output)
+
+    def _add(self, items: Sequence[T]) -> None:
+        self._waiting += len(items)
+        last = self._heard[-1] if self._heard else None
+        if isinstance(last, list):  # one group, so that the listener can tell how they lie in time
+            last += items
+        else:
+            self._heard.append(list(items))
 
     def _tell(self, states: list[DeviceState]) -> None:
         self._heard += states
@@ -153,17 +169,8 @@ class Conversation(Generic[T]):
     def _wait_s(self) -> float:
         return self._tick_s if self._paced is None else min(self._tick_s, self._paced.tick_s)
 
-    def _schedule(self, now: float, wait_s: float) -> None:
-        """A timer that rings too early is left alone: it costs less than a new one at every byte."""
-        self._due = on_the_beat(now + max(wait_s, _SHORTEST_TICK_S), wait_s)
-        if self._timer is None or self._timer.when() > self._due:
-            if self._timer is not None:
-                self._timer.cancel()
-            self._timer = self._loop.call_at(self._due, self._ring)
-
-    def _ring(self) -> None:
-        self._timer = None
-        if self._due - self._loop.time() < _SHORTEST_TICK_S / 2:
-            self._turn()
-        else:
-            self._timer = self._loop.call_at(self._due, self._ring)
+    def _schedule(self, watch: Watch, now: float, wait_s: float) -> None:
+        """A turn too early is left as it is: it costs less than to find the right moment after every byte."""
+        latest = now + max(wait_s, _SHORTEST_TICK_S)
+        if not now < watch.due <= latest:
+            watch.due = on_the_beat(latest, wait_s)

@@ -10,6 +10,8 @@ class Outgoing:
         self._output = bytearray()
 
     def output(self) -> bytes:
+        if not self._output:
+            return b""
         data = bytes(self._output)
         self._output.clear()
         return data

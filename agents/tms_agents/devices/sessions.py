@@ -68,3 +68,20 @@ class Polled(Paced, Protocol):
     """A paced session whose input is looked at when it is ticked, not at every byte: far fewer wake-ups."""
 
     polled: bool
+
+
+@runtime_checkable
+class Asking(Protocol[T_co]):
+    """A session that asks one question after the other, quickly: short ways for what happens most of the time."""
+
+    def answered(self, data: bytes) -> bytes | None:
+        """What to send, if anything, when ``data`` is just the answer that was waited for.
+
+        None where it is anything else: then nothing was taken, and ``receive`` has to look at it.
+        """
+
+    def nothing_by(self, now: float) -> None:
+        """At a look at the line after ``now``, time of the session's clock, nothing was there. A tick follows."""
+
+    def finished(self) -> Sequence[T_co]:
+        """Readings that were completed by a tick; each is given out once, here or by ``receive``."""

@@ -46,11 +46,11 @@ class Stream:
         Raises:
             DeviceFault: too much waits already.
         """
-        if self.unsent() > _MAX_UNSENT_BYTES:
-            raise DeviceFault("the device takes no commands")
-        if not data or self._broken:
+        if self._broken:
             return
-        if not self._unsent:
+        if len(self._unsent) > _MAX_UNSENT_BYTES:
+            raise DeviceFault("the device takes no commands")
+        if data and not self._unsent:
             data = data[self._send(data) :]
             if data and not self._broken:
                 asyncio.get_running_loop().add_writer(self.fd, self._send_rest)

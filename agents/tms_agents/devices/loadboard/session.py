@@ -9,8 +9,8 @@ An answer does not say which cell it is of, so one question is on the way at a t
   the pause, which was too short for this board, is doubled for a while.
 
 So that the last of these is seen in time, a round is kept back until the next one is due and the line was quiet for
-twice the slowest of the last answers, and handed out with the first answer of the next round. The numbers themselves
-carry no check sum: a wrong digit is for the estimator to find.
+twice the slowest of the last answers. The numbers themselves carry no check sum: a wrong digit is for the estimator to
+find.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ from tms_agents.devices.outgoing import Outgoing
 
 #: Sensor index -> the character that asks for it.
 INDEX = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_QUESTIONS = [character.encode() for character in INDEX]
 _NUMBER = re.compile(rb"[+-]?\d{1,10}")
+#: What nearly all answers look like.
+_USUAL = re.compile(rb'"?([+-]?\d{1,10})"?(?:OK)?\r\n')
 _OLD_FIRMWARE = b'OK"'
 #: Bytes of a line, at most.
 LONGEST_LINE = 40
@@ -91,13 +94,34 @@ class RosTmsBoardSession(Outgoing):
         self._overdue = False
         for line in self._lines.feed(data):
             self._line(answer_in(line), now)
+        return self.finished()
+
+    def answered(self, data: bytes) -> bytes | None:
+        asked = self._asked
+        if asked is None or self._lines.pending or not (answer := _USUAL.fullmatch(data)):
+            return None
+        now = self._heard_at = self._clock()
+        self._take(asked, float(answer[1]), now)
+        if not self._round:
+            self._asked = None
+            return b""
+        self._asked, self._asked_at = self._round.pop(0), now
+        return _QUESTIONS[self._asked]
+
+    def nothing_by(self, now: float) -> None:
+        self._overdue = now >= self._due() and not self._idle
+
+    def finished(self) -> list[LoadSample]:
         done, self._done = self._done, []
         return done
 
     @property
     def tick_s(self) -> float:
-        """Seconds until something is due."""
-        return 0.0 if self._overdue else self._due() - self._clock()
+        """Seconds until something is due; not more than to the next round, so that its time need not be told again."""
+        if self._overdue:
+            return 0.0
+        now, due = self._clock(), self._due()
+        return (self._next_round if now < self._next_round < due else due) - now
 
     def tick(self) -> None:
         now = self._clock()
@@ -142,16 +166,16 @@ class RosTmsBoardSession(Outgoing):
     def _start(self, now: float) -> None:
         self._next_round = next_moment(now, self._period_s)
         self._values = [float("nan")] * len(self._values)
-        self._round = [
-            cell for cell in range(len(self._values)) if self._misses[cell] < _MISSES or now >= self._ask_again[cell]
-        ]
+        self._round = list(range(len(self._values)))
+        if any(self._misses):
+            self._round = [one for one in self._round if self._misses[one] < _MISSES or now >= self._ask_again[one]]
         self._open_round = bool(self._round)
         self._ask_next(now)
 
     def _ask_next(self, now: float) -> None:
         if self._round:
             self._asked, self._asked_at, self._overdue = self._round.pop(0), now, False
-            self._output += INDEX[self._asked].encode()
+            self._output += _QUESTIONS[self._asked]
 
     def _line(self, line: bytes, now: float) -> None:
         if not line or self._draining:
@@ -161,13 +185,16 @@ class RosTmsBoardSession(Outgoing):
         elif (number := number_in(line)) is None:
             self._miss(now)
         else:
-            self._values[self._asked] = number
-            self._misses[self._asked] = 0
-            self._slowest_s = max(self._slowest_s * _FORGET, now - self._asked_at)
+            self._take(self._asked, number, now)
             self._asked = None
-            self.frames += 1
-            self.ready = True
             self._ask_next(now)
+
+    def _take(self, cell: int, number: float, now: float) -> None:
+        self._values[cell] = number
+        self._misses[cell] = 0
+        self._slowest_s = max(self._slowest_s * _FORGET, now - self._asked_at)
+        self.frames += 1
+        self.ready = True
 
     def _miss(self, now: float) -> None:
         assert self._asked is not None
@@ -188,6 +215,9 @@ class RosTmsBoardSession(Outgoing):
             return
         self._open_round = False
         self._pause_s = max(self._pause_s * _RELAX, self._late_s)
+        if not any(self._misses):
+            self._done.append(LoadSample(values=tuple(self._values)))
+            return
         dead = [str(cell) for cell, misses in enumerate(self._misses) if misses >= _MISSES]
         fault = f"no answer from cell {', '.join(dead)}" if dead else ""
         if not all(map(math.isnan, self._values)):
