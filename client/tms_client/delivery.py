@@ -23,7 +23,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(kw_only=True)
 class Pace:
-    """How fast to post: at most ``batch`` observations at once, at the latest ``linger_s`` after the first of them."""
+    """How fast to post: at most ``batch`` observations at once, at the latest ``linger_s`` after the first of them.
+
+    What comes after a pause is posted at once, what follows ``linger_s`` after it.
+    """
 
     batch: int = 500
     linger_s: float = 0.1

@@ -81,10 +81,11 @@ class Poster:
         while not self._stop.is_set():
             with self._one_at_a_time:
                 self._connection.run(self._delivery.drain(lambda: not self._stop.is_set()))
+            sent_at = time.monotonic()
             self._wake.wait()
             self._wake.clear()
             if len(self.spool) < self._pace.batch:
-                self._stop.wait(self._pace.linger_s)
+                self._stop.wait(max(0.0, self._pace.linger_s - (time.monotonic() - sent_at)))
 
 
 class AsyncPoster:
@@ -151,7 +152,8 @@ class AsyncPoster:
         while True:
             async with self._one_at_a_time:
                 await self._connection.run(self._delivery.drain(lambda: True))
+            sent_at = time.monotonic()
             await self._wake.wait()
             self._wake.clear()
             if len(self.spool) < self._pace.batch:
-                await asyncio.sleep(self._pace.linger_s)
+                await asyncio.sleep(max(0.0, self._pace.linger_s - (time.monotonic() - sent_at)))
