@@ -70,7 +70,7 @@ class Conversation(Generic[T]):
         Raises:
             DeviceFault, OSError: that ended it, after everything that came before.
         """
-        if not self._heard and not self._over:
+        if not self._over and not (self._heard and (self._watch is None or self._ripe(self._loop.time()))):
             self._listener = self._loop.create_future()
             await self._listener
         heard, self._heard, self._urgent, self._waiting = self._heard, [], False, 0
@@ -101,6 +101,7 @@ class Conversation(Generic[T]):
             if (asking := self._asking) is None:
                 self._take(now, self._stream.read() if readable or self._polled else None)
             elif not (data := self._stream.read()):
+                asking.prompt = self._gather_s() <= 0
                 asking.nothing_by(now)
                 self._take(now, data)
             elif (question := asking.answered(data)) is None:
@@ -108,7 +109,7 @@ class Conversation(Generic[T]):
             else:
                 if question:
                     self._stream.write(question)
-                if self._watch is not None and now < self._watch.due:
+                if (question or not asking.prompt) and self._watch is not None and now < self._watch.due:
                     return False
             if (wait_s := self._wait_s()) <= 0 and not self._over:
                 self._take(now, self._stream.read())
@@ -120,9 +121,11 @@ class Conversation(Generic[T]):
             self._pause()
             return self._wake()
         self._schedule(self._watch, now, wait_s)
-        if self._heard and (self._urgent or now - self._told_at >= self._gather_s() - _SHORTEST_TICK_S):
-            return self._wake()
-        return False
+        return self._wake() if self._heard and self._ripe(now) else False
+
+    def _ripe(self, now: float) -> bool:
+        """Whether what was heard may go to the listener."""
+        return self._urgent or now - self._told_at >= self._gather_s() - _SHORTEST_TICK_S
 
     def _wake(self) -> bool:
         if self._listener is None or self._listener.done():

@@ -74,6 +74,9 @@ class Polled(Paced, Protocol):
 class Asking(Protocol[T_co]):
     """A session that asks one question after the other, quickly: short ways for what happens most of the time."""
 
+    #: Somebody waits for every reading: it may cost more to have it early.
+    prompt: bool
+
     def answered(self, data: bytes) -> bytes | None:
         """What to send, if anything, when ``data`` is just the answer that was waited for.
 

@@ -7,8 +7,10 @@ import contextlib
 import os
 import socket
 
+import pytest
 from link_listening import QUICK, until
 
+from tms_agents.devices import waiting
 from tms_agents.devices.outgoing import Outgoing
 from tms_agents.devices.streams import Stream
 from tms_agents.devices.transport import DeviceFault, DeviceState, Link, tcp
@@ -161,3 +163,18 @@ async def test_a_host_that_refuses_is_named_and_tried_again():
         port = server.getsockname()[1]
     seen = await until(Link(tcp("127.0.0.1", port), Echo, name="it", retry=QUICK), lambda seen: bool(seen))
     assert seen[0].state == "faulty" and "Connect call failed" in seen[0].why
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        test_what_came_before_a_fault_is_delivered_before_it,
+        test_readings_wait_for_others_where_they_may_and_states_do_not,
+        test_a_session_that_wants_a_second_look_gets_it_at_once,
+        test_nothing_stays_behind_when_the_listener_goes,
+        test_a_device_that_takes_no_commands_is_a_fault_in_bounded_memory,
+        test_what_the_line_does_not_take_at_once_goes_out_later_in_order,
+    ],
+)
+def test_the_same_in_the_event_loop_of_the_agents(scenario):
+    waiting.run(scenario())

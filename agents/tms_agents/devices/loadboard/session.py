@@ -8,9 +8,9 @@ An answer does not say which cell it is of, so one question is on the way at a t
 * a line that nobody asked for says that an earlier answer was shifted to the next cell: the whole round is dropped, and
   the pause, which was too short for this board, is doubled for a while.
 
-So that the last of these is seen in time, a round is kept back until the next one is due and the line was quiet for
-twice the slowest of the last answers. The numbers themselves carry no check sum: a wrong digit is for the estimator to
-find.
+So that the last of these is seen in time, a round is kept back until the line was quiet for twice the slowest of the
+last answers, and, where nobody waits for it, until the next one is due. The numbers themselves carry no check sum: a
+wrong digit is for the estimator to find.
 """
 
 from __future__ import annotations
@@ -70,6 +70,7 @@ class RosTmsBoardSession(Outgoing):
         super().__init__()
         self.frames = 0
         self.ready = False
+        self.prompt = False
         #: Rounds thrown away because an answer came that nobody had asked for.
         self.doubtful_rounds = 0
         self._period_s, self._reply_s, self._late_s, self._retry_s = period_s, reply_s, late_s, retry_s
@@ -153,9 +154,9 @@ class RosTmsBoardSession(Outgoing):
         if self._draining:
             return self._heard_at + self._pause_s
         if self._open_round:
-            # Not before the next round begins: that is one wake-up for both.
-            quiet_s = min(max(2 * self._slowest_s, _LEAST_QUIET * self._period_s), self._late_s)
-            return max(self._heard_at + quiet_s, self._next_round)
+            quiet = self._heard_at + min(max(2 * self._slowest_s, _LEAST_QUIET * self._period_s), self._late_s)
+            # When the next round begins: that is one wake-up for both.
+            return quiet if self.prompt else max(quiet, self._next_round)
         return self._next_round
 
     @property

@@ -8,6 +8,7 @@ import math
 import pytest
 from link_listening import QUICK, on_a_line, samples, states, until
 
+from tms_agents.devices import waiting
 from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
@@ -92,3 +93,18 @@ async def test_garbage_a_power_cycle_and_silence_on_a_real_line():
         assert states(seen) == ["connected", "silent", "connected"]
         for sample in samples(seen):
             assert all(math.isnan(v) or v == w for v, w in zip(sample.values, (100, 200, 300, 400), strict=True))
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        lambda: test_counts_come_over_a_line("pty"),
+        lambda: test_counts_come_over_a_line("tcp"),
+        lambda: test_all_cells_asked_at_once_over_a_line("pty"),
+        test_the_board_is_asked_at_its_pace_whatever_the_tick_of_the_link,
+        test_a_pulled_cable_is_said_and_recovers_without_restart,
+        test_garbage_a_power_cycle_and_silence_on_a_real_line,
+    ],
+)
+def test_the_same_in_the_event_loop_of_the_agents(scenario):
+    waiting.run(scenario())

@@ -11,14 +11,23 @@ from hypothesis import strategies as st
 
 from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
+from tms_agents.devices.sessions import Asking
 from tms_agents.devices.transport import DeviceFault
 
 #: Every cell has values that no other cell has, so that a mix-up shows.
 CELLS = (1000, 2000, 3000, 4000)
 
 
+@pytest.fixture(params=["plain", "short", "prompt"], autouse=True)
+def ways(request, monkeypatch):
+    """As any link may do it; by the short ways, as ours does; and by these when somebody waits for every sample."""
+    monkeypatch.setattr(Wire, "ways", request.param)
+
+
 class Wire:
     """A session and a board on one wire; ``run`` moves time on in steps of a millisecond."""
+
+    ways = "plain"
 
     def __init__(self, device_options=None, kind=RosTmsBoardSession, **options) -> None:
         self.now = 0.0
@@ -32,7 +41,10 @@ class Wire:
         self.device = RosTmsBoardDevice(counts, boot_s=0.05, clock=clock, **(device_options or {}))
         self.session = kind(clock=clock, **options)
         self.session.opened()
-        self.noise = self.arrived = b""
+        self.noise = self.arrived = self.said = b""
+        self.short = self.ways != "plain" and isinstance(self.session, Asking)
+        if self.short:
+            self.session.prompt = self.ways == "prompt"
         self.due = 0.0
 
     def run(self, seconds: float, latency_s=lambda: 0.0) -> list:
@@ -40,17 +52,25 @@ class Wire:
         for _ in range(round(seconds * 1000)):
             self.now += 0.001
             self.device.delay_s = latency_s()
-            arrived = self.device.receive(self.session.output()) + self.device.tick() + self.noise
-            self.noise = b""
+            arrived = self.device.receive(self.said + self.session.output()) + self.device.tick() + self.noise
+            self.noise = self.said = b""
             self.arrived += arrived
             # As a link does: a polled session is looked after when it wants to be, any other one at every byte, too.
             if self.now < self.due and (getattr(self.session, "polled", False) or not self.arrived):
                 continue
+            if self.short and self.arrived and (question := self.session.answered(self.arrived)) is not None:
+                self.arrived, self.said = b"", question
+                if question or not self.session.prompt:
+                    continue
+            elif self.short and not self.arrived:
+                self.session.nothing_by(self.now)
             for _ in range(2):
                 if self.arrived:
                     samples += self.session.receive(self.arrived)
                     self.arrived = b""
                 self.session.tick()
+                if self.short:
+                    samples += self.session.finished()
                 if self.session.tick_s > 0:
                     break
             self.due = self.now + self.session.tick_s - 1e-6
