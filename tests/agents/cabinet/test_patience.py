@@ -53,7 +53,7 @@ class Bench:
 def test_samples_wait_at_rest_and_not_until_everything_is_told(tmp_path):
     bench = Bench(tmp_path)
     bench.run(5.0)
-    assert set(bench.run(2.0)[1]) == {0.1}
+    assert set(bench.run(2.0)[1]) == {0.2}
     bench.shelf.put("milk", 400.0, 0.2, 0.15)
     began = bench.now
     found, patience = bench.run(3.0)
@@ -62,7 +62,7 @@ def test_samples_wait_at_rest_and_not_until_everything_is_told(tmp_path):
     told_after = 50 * (appeared[0].observed_at.timestamp() - began)
     hurried = [n for n, one in enumerate(patience) if one == 0.0]
     assert hurried[0] <= 10 and hurried[-1] >= 0.9 * told_after
-    assert patience[-1] == 0.1
+    assert patience[-1] == 0.2
 
 
 def test_samples_never_wait_where_an_antenna_takes_turns_with_the_cells(tmp_path):

@@ -67,11 +67,11 @@ def interrupted(before, after, *, zeroes_itself=False):
     """What a load reads as before and after an interruption."""
     continuity = Continuity(2, zeroes_itself=zeroes_itself)
     for n in range(50):
-        last = continuity.take(n * 0.02, np.array(before))
+        last = continuity.take(n * 0.02, before)
     continuity.interrupted()
-    later = [continuity.take(9 + n * 0.02, np.array(after)) for n in range(50)]
+    later = [continuity.take(9 + n * 0.02, after) for n in range(50)]
     assert later[0] is None and later[-1] is not None
-    return last.tolist(), later[-1].tolist()
+    return last, later[-1]
 
 
 def test_zeros_that_jump_at_power_on_are_no_change():
@@ -88,30 +88,30 @@ def test_what_people_did_meanwhile_is_a_change():
 def test_what_a_stuck_cell_showed_is_forgotten_at_once():
     continuity = Continuity(2, zeroes_itself=False)
     for n in range(150):
-        continuity.take(n * 0.02, np.array([500.0, 9000.0 if 50 <= n < 110 else 300.0]))
+        continuity.take(n * 0.02, [500.0, 9000.0 if 50 <= n < 110 else 300.0])
     continuity.interrupted()
-    later = [continuity.take(9 + n * 0.02, np.array([508.0, 291.0])) for n in range(50)]
-    assert later[-1] is not None and later[-1].tolist() == [500.0, 300.0]
+    later = [continuity.take(9 + n * 0.02, [508.0, 291.0]) for n in range(50)]
+    assert later[-1] is not None and later[-1] == [500.0, 300.0]
 
 
 def test_what_was_under_way_before_the_interruption_tells_no_level():
     continuity = Continuity(2, zeroes_itself=False)
     for n in range(50):
-        continuity.take(n * 0.02, np.array([500.0, 300.0]))
+        continuity.take(n * 0.02, [500.0, 300.0])
     continuity.interrupted()
-    assert continuity.take(5.0, np.array([514.0, 286.0])) is None
-    later = [continuity.take(6.0 + n * 0.02, np.array([508.0, 291.0])) for n in range(50)]
-    assert later[0] is None and later[-1] is not None and later[-1].tolist() == [500.0, 300.0]
+    assert continuity.take(5.0, [514.0, 286.0]) is None
+    later = [continuity.take(6.0 + n * 0.02, [508.0, 291.0]) for n in range(50)]
+    assert later[0] is None and later[-1] is not None and later[-1] == [500.0, 300.0]
 
 
 def test_a_corrected_zero_is_remembered():
     first = Continuity(1, zeroes_itself=True)
-    first.take(0.0, np.array([400.0]))
+    first.take(0.0, [400.0])
     saved = first.to_dict()
     second = Continuity(1, zeroes_itself=True)
     second.restore(saved["shift"], saved["level"])
-    found = [second.take(n * 0.1, np.array([0.0])) for n in range(10)]
-    assert found[0] is None and found[-1] == 400.0
+    found = [second.take(n * 0.1, [0.0]) for n in range(10)]
+    assert found[0] is None and found[-1] == [400.0]
     with pytest.raises(ValueError, match="number of cells"):
         second.restore([0.0, 0.0], None)
 

@@ -1,0 +1,42 @@
+"""Where blocks of samples begin and end."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tms_agents.cabinet.blocks import Blocks
+from tms_agents.cabinet.settings import EstimatorSettings
+
+
+def blocks_of(samples, period_s: float = 0.02):
+    blocks = Blocks(samples.shape[1], EstimatorSettings())
+    done = [blocks.push(n * period_s, grams.tolist()) for n, grams in enumerate(samples)]
+    return [one[0] for one in done if one is not None]
+
+
+def noise(seconds: float, seed: int = 1):
+    return np.random.default_rng(seed).normal(0.0, 4.0, (round(seconds * 50), 4))
+
+
+def test_at_rest_all_blocks_are_of_the_same_length():
+    assert {block.n for block in blocks_of(noise(60.0))} == {4}
+
+
+@pytest.mark.parametrize("sample", range(200, 204))
+def test_a_block_ends_where_the_load_jumps(sample):
+    samples = noise(8.0)
+    samples[sample:] += 100.0
+    blocks = blocks_of(samples)
+    assert all(np.ptp(block.samples.sum(axis=1)) < 200.0 for block in blocks)
+    assert all(later.start == pytest.approx(one.end + 0.02) for one, later in itertools.pairwise(blocks))
+    assert sum(block.n for block in blocks) > 396  # none is lost
+
+
+def test_a_load_that_jumps_all_the_time_still_makes_blocks():
+    samples = noise(8.0)
+    samples[200:] += 100.0 * np.arange(200)[:, None]
+    lengths = [block.n for block in blocks_of(samples)]
+    assert all(sum(pair) >= 4 for pair in itertools.pairwise(lengths))
