@@ -17,6 +17,11 @@ class LineParser(FrameBuffer):
         self._longest = longest
         self._overlong = False
 
+    @property
+    def between(self) -> bool:
+        """Whether the next byte begins a line."""
+        return not self._buffer and not self._overlong
+
     def feed(self, data: bytes) -> list[bytes]:
         data = bytes(self._buffer) + data
         self._buffer.clear()

@@ -8,12 +8,13 @@ missing cannot be told: a board that does so again and again is a fault.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 
 from tms_agents.devices.beat import next_moment
 from tms_agents.devices.lines import LineParser
-from tms_agents.devices.loadboard.session import INDEX, LONGEST_LINE, answer_in, number_in
+from tms_agents.devices.loadboard.session import INDEX, LONGEST_LINE, USUAL_ANSWER, answer_in, number_in
 from tms_agents.devices.loads import LoadSample
 from tms_agents.devices.outgoing import Outgoing
 from tms_agents.devices.transport import DeviceFault
@@ -55,6 +56,7 @@ class RosTmsBoardBurst(Outgoing):
             clock,
         )
         self._lines = LineParser(LONGEST_LINE)
+        self._usual = re.compile(USUAL_ANSWER * cells)
         self._numbers: list[float] = []
         self._asked_at: float | None = None
         self._quiet_since: float | None = clock()  # what a former host asked for is thrown away first
@@ -65,6 +67,9 @@ class RosTmsBoardBurst(Outgoing):
         self._quiet_since = self._clock()
 
     def receive(self, data: bytes) -> list[LoadSample]:
+        waiting = self._asked_at is not None and self._quiet_since is None
+        if waiting and self._lines.between and not self._numbers and (answers := self._usual.fullmatch(data)):
+            return self._whole(tuple(map(float, answers.groups())))
         lines = self._lines.feed(data)
         if self._quiet_since is not None:
             self._quiet_since = self._clock()
@@ -74,13 +79,19 @@ class RosTmsBoardBurst(Outgoing):
         if None in numbers or len(self._numbers) > (self._cells if self._asked_at is not None else 0):
             self._spoil()
             return []
+        if len(self._numbers) == self._cells and not self._lines.pending:
+            return self._whole(tuple(self._numbers))
         done = [] if self._complete is None else [self._complete]
         self._complete = None
-        if len(self._numbers) == self._cells and not self._lines.pending:
-            self._complete = LoadSample(values=tuple(self._numbers))
-            self._numbers, self._asked_at, self._spoiled = [], None, 0
-            self.frames += self._cells
-            self.ready = True
+        return done
+
+    def _whole(self, values: tuple[float, ...]) -> list[LoadSample]:
+        """A round; what is handed out is the one before it, beside which nothing has come meanwhile."""
+        done = [] if self._complete is None else [self._complete]
+        self._complete = LoadSample(values=values)
+        self._numbers, self._asked_at, self._spoiled = [], None, 0
+        self.frames += self._cells
+        self.ready = True
         return done
 
     @property

@@ -30,7 +30,8 @@ INDEX = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _QUESTIONS = [character.encode() for character in INDEX]
 _NUMBER = re.compile(rb"[+-]?\d{1,10}")
 #: What nearly all answers look like.
-_USUAL = re.compile(rb'"?([+-]?\d{1,10})"?(?:OK)?\r\n')
+USUAL_ANSWER = rb'"?([+-]?\d{1,10})"?(?:OK)?\r\n'
+_USUAL = re.compile(USUAL_ANSWER)
 _OLD_FIRMWARE = b'OK"'
 #: Bytes of a line, at most.
 LONGEST_LINE = 40
@@ -99,7 +100,7 @@ class RosTmsBoardSession(Outgoing):
 
     def answered(self, data: bytes) -> bytes | None:
         asked = self._asked
-        if asked is None or self._lines.pending or not (answer := _USUAL.fullmatch(data)):
+        if asked is None or not self._lines.between or not (answer := _USUAL.fullmatch(data)):
             return None
         now = self._heard_at = self._clock()
         self._take(asked, float(answer[1]), now)
