@@ -34,6 +34,7 @@ from tms_agents.devices.scip import ReplyParser as ScipParser
 from tms_agents.devices.scip import measurement as scip_measurement
 from tms_agents.devices.scip import wording as scip
 from tms_agents.devices.scip.frames import MAX_REPLY
+from tms_agents.devices.sessions import Asking
 from tms_agents.devices.text_reader import Rdm6300Parser, TextReaderSession
 from tms_agents.devices.thingmagic.codec import ReplyParser
 from tms_agents.devices.thingmagic.session import ThingMagicSession
@@ -70,10 +71,16 @@ class _Clocked:
     def feed(self, data: bytes) -> None:
         self._fed += 1
         try:
-            self._session.receive(data)
+            asking = self._session if isinstance(self._session, Asking) else None
+            if asking is None or asking.answered(data) is None:
+                self._session.receive(data)
             for _ in range(1 if self._fed % 7 else 5):
                 self._now += 0.002 if self._fed % 7 else 0.3
+                if asking is not None and self._fed % 3:
+                    asking.nothing_by(self._now)
                 self._session.tick()
+                if asking is not None:
+                    asking.finished()
                 self._session.output()
         except DeviceFault:
             self._begin()
