@@ -216,9 +216,11 @@ class Referee:
             if name in left and stay in stays and apart <= position_gate(self._world, left[name]):
                 thing = left.pop(name)
                 _, tag = stays.pop(stay)
-                wrong = not self._contestant.by_tag and self._stay.get(name) not in standing
-                if wrong and stay not in self._stay.values():
-                    # Put right after a false alarm and a miss that have been counted.
+                held = standing.get(self._stay.get(name, ""))
+                elsewhere = held is None or not self._near(thing, held[0])
+                if elsewhere and not self._contestant.by_tag and stay not in self._stay.values():
+                    # Put right after a false alarm and a miss that have been counted, also where a part of what the
+                    # thing was held for is still held to be somewhere else.
                     self._stay[name] = stay
                 self.scores.placed += 1
                 self.scores.named += thing.tag is not None and tag == thing.tag

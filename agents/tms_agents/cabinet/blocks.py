@@ -1,7 +1,5 @@
 """From samples to block means, without the samples of cells that cannot be believed.
 
-A block ends early where the load jumps, so that what is steady after a jump is not mixed with what was before it.
-
 A cell is unusable while it delivers NaN, is overloaded, or repeats one value for longer than its noise makes credible
 (a stuck cell; all cells at once: a board without power). While any cell is unusable there are no blocks: a centre of
 gravity needs every cell, and a load that changed meanwhile is found against the old resting level afterwards.
@@ -23,9 +21,6 @@ from tms_agents.cabinet.settings import EstimatorSettings
 _REPEAT_START, _REPEAT_LEAST, _REPEAT_MOST = 0.5, 0.15, 0.999
 #: A run of the same value that is so improbable (negative log) is suspect, though the cell may still be alive.
 _SUSPECT = 3.0
-#: A jump: from one sample to the next the sum of all cells changes by so many times what is usual, and how fast that is
-#: learnt.
-_JUMP, _JUMP_LEARNING = 6.0, 0.02
 _NOTHING: Array = np.empty(0)
 
 
@@ -55,10 +50,6 @@ class Blocks:
         self._samples: list[list[float]] = []
         self._start = 0.0
         self._before: deque[list[float]] = deque(maxlen=2)
-        #: Time and sum of the newest sample.
-        self._newest, self._sum = 0.0, 0.0
-        #: Square of what the sum usually changes from sample to sample, g^2; whether the last block ended early.
-        self._usual, self._early = math.inf, False
         self._last = [math.nan] * cells
         self._run = [0] * cells
         self._repeat = [_REPEAT_START] * cells
@@ -73,38 +64,19 @@ class Blocks:
             self._samples.clear()
             self._before.clear()
             return None
-        done = None
-        total = sum(values)
         if not self._samples:
             self._start = t
-        elif self._jumps(total - self._sum) and not self._early:
-            done = self._end()
-            self._start, self._early = t, True
-        self._newest, self._sum = t, total
         self._samples.append(values)
         # Half a period early, so that jitter of the sampling does not make every second block one sample longer.
         lasts, n = t - self._start, len(self._samples)
-        if done is not None or (lasts + 1.5 * (lasts / max(n - 1, 1)) < self._settings.block_s and lasts >= 0):
-            return done
-        self._early = False
-        return self._end()
-
-    def _end(self) -> tuple[Block, list[list[float]]]:
+        if lasts >= 0 and lasts + 1.5 * (lasts / max(n - 1, 1)) < self._settings.block_s:
+            return None
         own = np.array(self._samples)
-        n = len(own)
-        block = Block(self._start, self._newest, n, np.add.reduce(own, axis=0) / n, _NOTHING, own, _NOTHING)
+        block = Block(self._start, t, n, np.add.reduce(own, axis=0) / n, _NOTHING, own, _NOTHING)
         samples = [*self._before, *self._samples]
         self._before.extend(self._samples[-2:])
         self._samples = []
         return block, samples
-
-    def _jumps(self, change: float) -> bool:
-        square, usual = change * change, self._usual
-        if usual == math.inf:
-            self._usual = square
-            return False
-        self._usual += _JUMP_LEARNING * (min(square, 9 * usual + 1.0) - usual)
-        return square > _JUMP**2 * usual
 
     def frozen(self, since: float) -> bool:
         """Whether a cell has shown nothing but one value from ``since`` on, though it is too early to call it stuck."""

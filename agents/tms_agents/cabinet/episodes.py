@@ -37,6 +37,8 @@ _HOPELESS, _MOST, _MOST_PATHS = 25.0, 250, 12
 _WAY_BLOCKS, _MOST_ODDS = 600, 4.5
 #: The least weight of a thing, and how many of its standard deviations it must be.
 _LEAST_G, _CLEAR = 14.0, 2.0
+#: How wrong the weight of a thing may be that agrees with its tag's.
+_OFF_SHARE, _OFF_G = 0.02, 3.0
 #: The centre of two is somewhere in the middle rather than anywhere (log density).
 _IN_THE_MIDDLE = math.log(1.5)
 #: How often something happens that nobody can explain, and a thing goes that nobody knew of.
@@ -143,7 +145,11 @@ def _of_nothing(left: Array, variance: Array, total: float, gone: Sequence[Thing
     """Log density of what is left and should be nothing: but for noise, or for what was measured badly."""
     share, far = (_SHAKEN, _SHAKEN_G) if shaking else (_LOOSE, _BADLY_G)
     more = far**2 + sum(((0.1 * np.abs(thing.load)) ** 2 for thing in gone), np.zeros_like(left))
-    well, badly = balanced(left, variance, total), balanced(left, variance + more, total + float(more.sum()))
+    sum_more = float(more.sum())
+    if gone and not shaking and all(thing.known is not None and not thing.joint for thing in gone):
+        # What they weigh was measured well: it is what their tags say.
+        sum_more = sum((_OFF_SHARE * float(thing.load.sum()) + _OFF_G) ** 2 for thing in gone)
+    well, badly = balanced(left, variance, total), balanced(left, variance + more, total + sum_more)
     return float(np.logaddexp(math.log(1 - share) + well, math.log(share) + badly))
 
 

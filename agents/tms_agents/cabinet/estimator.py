@@ -12,6 +12,7 @@ import numpy as np
 from tms_agents.cabinet.balance import Balance, search
 from tms_agents.cabinet.blocks import Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
+from tms_agents.cabinet.caution import IN_HAND_S, Caution
 from tms_agents.cabinet.events import CabinetEvent, Stay
 from tms_agents.cabinet.fusion import Evidence, Explanation, explain
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
@@ -28,17 +29,16 @@ from tms_agents.cabinet.wobble import Wobble
 #: An unclear level that the load left sooner than this was one in passing.
 _PASSING_S = 0.8
 #: How long the load must rest before its sum is believed, and before what it says is corrected (everything since the
-#: last rest has been looked at by then), how sure another explanation must be, and how long a lifted
-#: thing's tag may stay in view in the hand.
-_BALANCE_S, _CORRECT_S, _BALANCE_SURE, _IN_HAND_S = 1.0, 4.0, 0.9, 0.8
-#: Rounds that must have told of a tag before its thing is one of several that changed at once.
-_HEARD = 2
-#: Several at once are believed only at a level that is no pause between them.
-_SEVERAL_S = 0.7
+#: last rest has been looked at by then), and how sure another explanation must be.
+_BALANCE_S, _CORRECT_S, _BALANCE_SURE = 1.0, 4.0, 0.9
 #: How long it must be steady before what is not simple is decided by all that happened since the last rest.
 _VERDICT_S = 1.5
 #: What may be a part of several things that are being put must stay so for so long to be believed.
 _PART_S = 3.0
+#: A load that only seems to put an error right may be a light thing on its way: it must stay so for so long.
+_SETTLED_S = 2.5
+#: How often a lifted thing's tag is still in view after ``IN_HAND_S``: while it is carried over the board.
+_CARRIED = 0.1
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
 _JUMP_G = 6.0
 #: A block so near the resting level tells how much it wobbles.
@@ -78,6 +78,7 @@ class CabinetEstimator:
         self._book = Bookkeeper(self._shelf, self._settings)
         self._balance = Balance(self._shelf, self._settings)
         self._namer = Namer(self._shelf, self._presence, self._zones, self._known, self._settings)
+        self._caution = Caution(self._shelf, self._presence, self._namer, self._settings)
         self._hindsight = Hindsight(self._shelf, self._presence, self._namer, self._settings)
 
     # --- input
@@ -191,7 +192,7 @@ class CabinetEstimator:
         def taken(thing: Thing) -> float:
             if thing.tag is None:
                 return 0.0
-            return self._presence.taken(thing.tag, max(self._rested, thing.since) + _IN_HAND_S, 0.01)
+            return self._presence.taken(thing.tag, max(self._rested, thing.since) + IN_HAND_S, 0.01)
 
         return Evidence(taken, self._namer.loose())
 
@@ -214,6 +215,9 @@ class CabinetEstimator:
             explanations = [item for item in explanations if item.kind != "press"]
         best, *others = explanations
         if best.kind == "settled":
+            if steady < _SETTLED_S and abs(step.weight_g) > self._settings.min_weight_g:
+                self._detector.ignore(step) if final else self._detector.hold(step)
+                return []
             self._detector.accept(step)
             self._rested = step.settled
             return []
@@ -232,15 +236,16 @@ class CabinetEstimator:
                 self._detector.accept(step)
             return []
         odd = fits_none(best, step, self._namer.loose())
+        odd = odd or self._caution.may_be_the_rest(step, best)
         if self._settings.knows_places and (odd or (best.several and best.kind != "slide")):
             if waited < self._settings.stubborn_s:
                 return self._by_verdict(step, steady)
             if steady < _VERDICT_S:
                 self._detector.ignore(step)
                 return []
-        arm = self._may_be_an_arm(step, best)
+        arm = self._caution.may_be_an_arm(step, best)
         patience = self._settings.stubborn_s if arm else self._settings.patience_s
-        unsure = arm or self._unclear(step, best) or (odd and not _PASSING_S < waited < math.inf)
+        unsure = arm or self._caution.unclear(step, explanations) or (odd and not _PASSING_S < waited < math.inf)
         # Several tags are new: one thing has come, and another is on its way.
         part = odd and len(self._namer.loose()) > 1
         if (unsure and waited < patience) or (part and waited < _PART_S):
@@ -271,25 +276,6 @@ class CabinetEstimator:
         level, variance = step.before + step.change, step.variance - step.before_variance
         return self._balance.compare(step.onset, step.settled, step.now, level, variance)
 
-    def _unclear(self, step: Step, best: Explanation) -> bool:
-        if not best.several:
-            return best.score < 0.9 or not best.tight
-        touched = best.removed if best.thing is None else (*best.removed, best.thing)
-        tags = [thing.tag for thing in touched if thing.tag is not None]
-        heard = all(self._heard(tag, step.settled) for tag in tags)
-        return best.score < 0.97 or not heard or step.now - step.settled < _SEVERAL_S
-
-    def _heard(self, tag: str, since: float) -> bool:
-        """Whether the rounds have told if the tag has gone; one that is read may be in the hand at first."""
-        read, missed = self._presence.rounds(tag, since)
-        return (read == 0 and missed >= _HEARD) or any(self._presence.rounds(tag, since + _IN_HAND_S))
-
-    def _may_be_an_arm(self, step: Step, best: Explanation) -> bool:
-        """A new load without a tag, not yet steady for long or not as quiet as a thing: somebody may lean on it."""
-        if best.kind not in ("put", "two") or self._namer.loose():
-            return False
-        return step.now - step.settled < self._settings.untagged_s or step.restless > self._settings.restless
-
     def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         self._detector.accept(step)
         return self._apply(step, explanation)
@@ -315,11 +301,11 @@ class CabinetEstimator:
         def taken(thing: Thing) -> float:
             if thing.tag is None:
                 return 0.0
-            later = step.settled + _IN_HAND_S
+            later = step.settled + IN_HAND_S
             soon = self._presence.taken(thing.tag, step.settled)
             if sum(self._presence.rounds(thing.tag, later)) == 0:
                 return soon
-            return min(soon, self._presence.taken(thing.tag, later, 0.02))
+            return min(soon, self._presence.taken(thing.tag, later, _CARRIED))
 
         if settling is None:
             return Evidence(taken, self._namer.loose(), doubts=self._book.doubts)

@@ -39,7 +39,7 @@ _PRIOR: dict[Kind, float] = {
     "adjust": 0.3,
     "press": 0.1,
     "unknown": 1e-4,
-    "settled": 0.3,
+    "settled": 0.1,
 }
 _TWO_TAKEN = 0.03
 #: Two things put at once: usually, and while two tags that are at no stay are in view.
@@ -51,6 +51,8 @@ _PRESSED_SLIDE = 0.03
 _SWING_G, _SWINGS, _STEADIER = 9.0, 0.3, 0.2
 #: How often a thing was measured badly: pressed, or under a leaning arm.
 _LOOSE = 0.03
+#: How wrong its weight may be then (share of it, g), where that of its tag agreed with it and where nothing is known.
+_KNOWN, _UNKNOWN = (0.02, 4.0), (0.1, 8.0)
 #: How far from its centre a hand presses on a thing, and how near to each other the centres of two things hardly are.
 _HAND_M, _CROWDED_M = 0.015, 0.03
 #: Two things put at once stand so far apart at least; nearer, it was one that was tilted (log-odds of the price).
@@ -191,7 +193,9 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
 def _remaining(left: Array, variance: Array, total: float, thing: Thing) -> tuple[float, float]:
     """Log densities of what is left when ``thing`` is taken: measured well, and badly."""
     badly = (0.15 * np.abs(thing.load) + 12.0) ** 2
-    loose = balanced(left, variance + badly, total + float(badly.sum()))
+    share, least = _KNOWN if thing.known is not None and not thing.joint else _UNKNOWN
+    more = min((share * float(thing.load.sum()) + least) ** 2, float(badly.sum()))
+    loose = balanced(left, variance + badly, total + more)
     return math.log(1 - _LOOSE) + balanced(left, variance, total), math.log(_LOOSE) + loose
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tms_agents.cabinet.baseline import Level
 from tms_agents.cabinet.blocks import Block
+from tms_agents.cabinet.caution import IN_HAND_S
 from tms_agents.cabinet.episodes import Episode, Outcome, outcomes
 from tms_agents.cabinet.events import CabinetEvent
 from tms_agents.cabinet.geometry import Array
@@ -31,12 +32,13 @@ _SURE, _DOUBT = 0.9, 0.05
 _SURE_SHAKEN, _SURE_AT_ONCE = 0.98, 0.85
 #: What was told and is so probable is looked at no more once the board rests.
 _CERTAIN = 0.95
+#: A verdict that is so sure ends the episode: the next change begins another one. Not where something does not weigh
+#: what its tag says: the rest of it may follow.
+_CLOSES = 0.97
 #: How much more probable an outcome is that was told step by step.
 _TOLD = 8.0
 #: More often than that an episode is not put right: something else speaks against it.
 _MOST_REVISIONS = 2
-#: How long a lifted thing's tag may stay in view in the hand.
-_IN_HAND_S = 0.8
 #: So long before the load changes the tag of what is brought may come into view.
 _BROUGHT_S = 3.0
 #: Rounds go wrong in ways of their own: no tag's evidence counts more than this.
@@ -55,6 +57,8 @@ class Hindsight:
         self._uncertain = False
         self._looked = -math.inf
         self._sure = False
+        #: The tags that were in view when it was looked at.
+        self._heard: frozenset[str] = frozenset()
         self._revisions = 0
 
     def changing(self, block: Block, level: Level) -> None:
@@ -62,6 +66,7 @@ class Hindsight:
         if self._before is not None:
             self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start)
             self._before, self._uncertain, self._revisions = None, False, 0
+        self._sure = False
         if self._episode is not None:
             self._episode.add(block)
 
@@ -74,16 +79,14 @@ class Hindsight:
     ) -> list[CabinetEvent]:
         """The load rests at ``level``, (k,) g, for some ``seconds``; the last change ended at ``rested``."""
         events: list[CabinetEvent] = []
-        again = not self._sure and t - self._looked >= _AGAIN_S
-        due = seconds >= _LOOK_S and (seconds < _RARELY_S or again)
+        again = seconds < _RARELY_S or t - self._looked >= _AGAIN_S
+        due = seconds >= _LOOK_S and again and not (self._sure and self._present() == self._heard)
         if self._episode is not None and due and self._revisions < _MOST_REVISIONS:
             self._looked = t
+            self._heard = self._present()
             events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
         if seconds >= _RESTED_S:
-            self._before = [
-                replace(thing, load=thing.load.copy(), variance=thing.variance.copy())
-                for thing in self._shelf.things.values()
-            ]
+            self._before = self._copies()
         if seconds >= _CLOSED_S:
             self._episode = None
         return events
@@ -99,7 +102,12 @@ class Hindsight:
     def tell(self, outcome: Outcome, t: float) -> list[CabinetEvent]:
         """Make the shelf what a verdict says."""
         assert self._episode is not None
-        return self._revision(self._episode, outcome, t).events()
+        events = self._revision(self._episode, outcome, t).events()
+        known = {thing.id for thing in self._episode.things}
+        new = [thing for i, thing in self._shelf.things.items() if i not in known]
+        if outcome.score >= _CLOSES and not any(self._namer.misfits(thing) for thing in new):
+            self._before = self._copies()
+        return events
 
     def _revise(
         self, episode: Episode, t: float, level: Array, variance: Array, rested: float, shaking: bool
@@ -140,7 +148,7 @@ class Hindsight:
             variance,
             Known(
                 {*self._namer.loose(), *(thing.tag for thing in things.values() if thing.tag is not None)},
-                lambda tag: self._odds(tag, rested + _IN_HAND_S),
+                lambda tag: self._odds(tag, rested + IN_HAND_S),
                 self._namer.weight,
                 shaking,
                 self._namer.fresh(episode.onset - _BROUGHT_S),
@@ -155,6 +163,15 @@ class Hindsight:
         there = read * math.log(hit) + missed * math.log(1 - hit)
         gone = read * math.log(false) + missed * math.log(1 - false)
         return float(np.logaddexp(there, -_MOST_ODDS)), float(np.logaddexp(gone, -_MOST_ODDS))
+
+    def _present(self) -> frozenset[str]:
+        return frozenset(self._presence.present())
+
+    def _copies(self) -> list[Thing]:
+        return [
+            replace(thing, load=thing.load.copy(), variance=thing.variance.copy())
+            for thing in self._shelf.things.values()
+        ]
 
     def _left(self, thing: Thing, t: float) -> None:
         at = thing.centre(self._shelf.geometry)

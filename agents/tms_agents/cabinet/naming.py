@@ -43,6 +43,10 @@ class Namer:
         """What the object weighed when it was here last, else what the database says."""
         return self.learned.get(tag) or self.known.get(tag)
 
+    def misfits(self, thing: Thing) -> bool:
+        """Whether it does not weigh what its tag says."""
+        return thing.tag is not None and thing.known is None and self.weight(thing.tag) is not None
+
     def loose(self) -> dict[str, KnownWeight | None]:
         """The present tags that are at no stay, with what is known of their weights: what may be put next."""
         return {tag: self.weight(tag) for tag in self._loose}

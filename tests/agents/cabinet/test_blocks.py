@@ -25,18 +25,7 @@ def test_at_rest_all_blocks_are_of_the_same_length():
     assert {block.n for block in blocks_of(noise(60.0))} == {4}
 
 
-@pytest.mark.parametrize("sample", range(200, 204))
-def test_a_block_ends_where_the_load_jumps(sample):
-    samples = noise(8.0)
-    samples[sample:] += 100.0
-    blocks = blocks_of(samples)
-    assert all(np.ptp(block.samples.sum(axis=1)) < 200.0 for block in blocks)
+def test_no_sample_is_lost_between_blocks():
+    blocks = blocks_of(noise(8.0))
     assert all(later.start == pytest.approx(one.end + 0.02) for one, later in itertools.pairwise(blocks))
-    assert sum(block.n for block in blocks) > 396  # none is lost
-
-
-def test_a_load_that_jumps_all_the_time_still_makes_blocks():
-    samples = noise(8.0)
-    samples[200:] += 100.0 * np.arange(200)[:, None]
-    lengths = [block.n for block in blocks_of(samples)]
-    assert all(sum(pair) >= 4 for pair in itertools.pairwise(lengths))
+    assert sum(block.n for block in blocks) > 396
