@@ -1,7 +1,13 @@
 """Objects on the floor: was every thing found where it lay, kept while it was hidden, and let go when it was gone?
 
-A span is one stay of a thing on the floor, to be found if two beams ever met it. A label belongs to a span if it was
-told during it, three times at least, and its median place is within 12 cm and half the thing's size.
+A span is one stay of a thing on the floor. A label belongs to a span if it was told during it, three times at least,
+and its median place is within 12 cm and half the thing's size.
+
+A thing has to be found if it can be told from a foot. All that a laser knows of a foot is where it stands and for how
+long: 0.5 to 0.8 s in a stride, some 1.2 s when somebody stops, turns or makes a small step. What no two beams have
+ever met at once, or any beam for less than two seconds altogether (furniture was pushed before it at once, or somebody
+stood before it until he took it), looks like one more step. Such spans count neither as found nor as missed, and a
+label there is not false. How long a thing was met is what really was, whatever the estimator makes of it.
 """
 
 from __future__ import annotations
@@ -23,12 +29,15 @@ Prediction = Sequence[Mapping[str, Any]]
 #: Of what a false object was made: moved furniture, somebody's feet, a thing already gone or not there yet, no idea.
 KINDS = ("furniture", "mover", "other")
 _NEAR_M, _SETTLE_S, _STALE_S, _NO = 0.12, 2.0, 3.0, 1e3
+#: What was in sight for less (s) looks like a foot.
+_FOOT_S = 2.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Span:
     """What became of one stay. Seconds and metres, NaN or 0 where it does not apply.
 
+    ``met_s``: for how long any beam met it.
     ``latency_s`` from when it could be seen; ``kept_s`` of ``hidden_s`` the label was there although nothing met the
     thing for a second or more; ``removal_s`` from when its place was clear, NaN where it stayed or that is unknown.
     """
@@ -36,6 +45,7 @@ class Span:
     thing: str
     size: float
     found: bool
+    met_s: float = math.inf
     latency_s: float = math.nan
     error_m: float = math.nan
     breaks: int = 0
@@ -43,6 +53,11 @@ class Span:
     kept_s: float = 0.0
     hidden_s: float = 0.0
     removal_s: float = math.nan
+
+    @property
+    def needed(self) -> bool:
+        """Whether it was in sight for long enough to be told from a foot."""
+        return self.met_s >= _FOOT_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +88,18 @@ class ObjectScores:
         )
 
     def recall(self, smallest: float = 0.0, largest: float = math.inf) -> float:
-        """Share of the spans of things of these sizes that were found; NaN of none."""
-        these = [span.found for span in self.spans if smallest <= span.size <= largest]
+        """Share of the spans to be found, of things of these sizes, that were found; NaN of none."""
+        these = [span.found for span in self.needed(smallest, largest)]
         return float(np.mean(these)) if these else math.nan
+
+    def needed(self, smallest: float = 0.0, largest: float = math.inf) -> list[Span]:
+        """The spans of things of these sizes that could be found."""
+        return [span for span in self.spans if span.needed and smallest <= span.size <= largest]
+
+    @property
+    def glimpsed(self) -> list[Span]:
+        """Spans of things that were hardly ever in sight."""
+        return [span for span in self.spans if not span.needed]
 
     @property
     def precision(self) -> float:
@@ -118,7 +142,7 @@ class ObjectScores:
     def summary(self) -> str:
         kinds = Counter(one.kind for one in self.false)
         return (
-            f"objects: recall {self.recall():.3f} of {len(self.spans)}, precision {self.precision:.3f}, "
+            f"objects: recall {self.recall():.3f} of {len(self.needed())}, precision {self.precision:.3f}, "
             f"latency {self.median('latency_s'):.2f} s, error {1e3 * self.median('error_m'):.0f} mm, "
             f"breaks {self.breaks}, kept {self.kept:.3f}, removal {self.median('removal_s'):.2f} s, "
             f"stale {self.stale}, false {dict(kinds)}"
@@ -154,7 +178,7 @@ def score_objects(truth: Truth, prediction: Prediction) -> ObjectScores:
             mine = [tracks[labels[j]] for j in range(len(labels)) if gaps[i, j] < _NO / 2]
             results.append(_followed(thing, span, tracks[labels[best[i]]], mine, told_at, end))
         else:
-            results.append(Span(thing=thing["id"], size=thing["size"], found=False))
+            results.append(Span(thing=thing["id"], size=thing["size"], found=False, met_s=_met_s(span, end)))
     nobodys = [tracks[label] for j, label in enumerate(labels) if not (gaps[:, j] < _NO / 2).any()]
     step = (told_at[-1] - told_at[0]) / max(len(told_at) - 1, 1)
     false = [
@@ -205,6 +229,7 @@ def _followed(
         thing=thing["id"],
         size=thing["size"],
         found=True,
+        met_s=_met_s(span, end),
         latency_s=max(0.0, float(min(track[0, 0] for track in mine)) - first),
         error_m=float(np.median(errors)) if len(errors) else math.nan,
         breaks=len(mine) - 1,
@@ -213,6 +238,14 @@ def _followed(
         hidden_s=float(hidden.sum() * step),
         removal_s=float(gone - span["first_clear"]) if span["t_picked"] and span["first_clear"] else math.nan,
     )
+
+
+def _met_s(span: Mapping[str, Any], end: float) -> float:
+    """For how long a beam met it; older recordings tell only for which share of the time two did."""
+    if "met_s" in span:
+        return float(span["met_s"])
+    during = (span["t_picked"] or end) - span["t_placed"]
+    return float(span.get("visible_fraction", 1.0) * during)
 
 
 def _kind(track: Floats, truth: Truth) -> str:

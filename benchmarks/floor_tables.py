@@ -52,7 +52,7 @@ def objects_table(table: Table) -> str:
                 scene,
                 feet,
                 name,
-                str(len(all_of.spans)),
+                str(len(all_of.needed())),
                 number(all_of.recall(0.0, 0.04)),
                 number(all_of.recall(0.04, 0.07)),
                 number(all_of.recall(0.07, 0.14)),
@@ -93,6 +93,7 @@ def requirements_table(every: Mapping[tuple[str, str, str], Sequence[Scores]]) -
     row("recall 1.0 from 5 cm", plain, "large")
     row("recall >= 0.8 of 3 cm", plain, "small")
     row("recall of black and glossy things", ("glossy",), "recall")
+    row("found of those in sight for less than 2 s", None, "glimpsed")
     row("kept while hidden >= 0.99", plain, "kept")
     row("false objects <= 1 in 10 minutes, without furniture", None, "false")
     row("false objects <= 1 per furniture move", None, "move")
@@ -107,8 +108,9 @@ def _asked(value: str, scores: Sequence[Scores]) -> str:
         return spread([one.movers.idf1 for one in scores]) + f", worst {min(one.movers.idf1 for one in scores):.2f}"
     if value in ("large", "small", "recall"):
         low, high = {"large": (0.04, 9.0), "small": (0.0, 0.04), "recall": (0.0, 9.0)}[value]
-        these = [span for span in objects.spans if low <= span.size <= high]
-        return f"{number(objects.recall(low, high), 3)} of {len(these)}"
+        return f"{number(objects.recall(low, high), 3)} of {len(objects.needed(low, high))}"
+    if value == "glimpsed":
+        return f"{sum(span.found for span in objects.glimpsed)} of {len(objects.glimpsed)}"
     if value == "kept":
         return f"{number(objects.kept, 3)} of {sum(span.hidden_s for span in objects.spans):.0f} s"
     if value == "false":

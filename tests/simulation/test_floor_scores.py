@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import math
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -150,6 +151,20 @@ def test_a_label_kept_while_the_thing_is_hidden_and_too_long_after_it_is_gone() 
     assert objects.median("removal_s") == pytest.approx(4.0)
     assert objects.stale == 1
     assert not objects.false
+
+
+def test_what_was_hardly_ever_in_sight_counts_neither_way() -> None:
+    truth = strolls(np.random.default_rng(4), people=0, seconds=40.0)
+    (span,) = truth["objects"][0]["spans"]
+    nothing = [{"t": t, "labels": []} for t in truth["t"]]
+    label = {"id": 1, "attr": "object", "x": span["x"], "y": span["y"]}
+    found = [{"t": t, "labels": [label] if t > 10.0 else []} for t in truth["t"]]
+    span["met_s"] = 1.5
+    for frames in (nothing, found):
+        objects = scores.score(truth, frames).objects
+        assert (math.isnan(objects.recall()), len(objects.glimpsed), objects.false) == (True, 1, [])
+    span["met_s"] = 2.5
+    assert scores.score(truth, nothing).objects.recall() == 0.0
 
 
 def test_false_objects_are_told_by_what_they_are_made_of() -> None:

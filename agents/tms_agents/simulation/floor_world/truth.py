@@ -160,7 +160,7 @@ class Witness:
         return list(objects.values())
 
     def _sight(self, hits: dict[str, list[int]], stay: Stay) -> dict[str, Any]:
-        """When it was first seen, how often, and from when to when (1 s or more) not at all."""
+        """When it was first seen, how often, how long a beam met it, and from when to when (1 s or more) none did."""
         t = np.array(self.times[self._frames_of])
         most = np.zeros(len(t))
         for laser, counts in hits.items():
@@ -169,7 +169,7 @@ class Witness:
         inside = (t >= stay.placed_at) & (t < (stay.picked_at if stay.picked_at is not None else math.inf))
         seen = inside & (most >= SEEN_BEAMS)
         if not seen.any():
-            return {"first_visible": None, "visible_fraction": 0.0, "occluded": []}
+            return {"first_visible": None, "visible_fraction": 0.0, "met_s": 0.0, "occluded": []}
         first = t[seen][0]
         times, any_hit = t[inside & (t >= first)], most[inside & (t >= first)] > 0
         occluded, begun = [], None
@@ -182,7 +182,13 @@ class Witness:
                     occluded.append([round(float(times[begun]), 3), round(float(end), 3)])
                 begun = None
         share = float(seen.sum() / inside.sum())
-        return {"first_visible": round(float(first), 3), "visible_fraction": round(share, 3), "occluded": occluded}
+        period = self._life.room.mounts[self._frames_of].laser.period_s
+        return {
+            "first_visible": round(float(first), 3),
+            "visible_fraction": round(share, 3),
+            "met_s": round(float(any_hit.sum()) * period, 3),
+            "occluded": occluded,
+        }
 
     def _furniture(self) -> list[dict[str, Any]]:
         found = []
