@@ -35,6 +35,8 @@ CLUSTER = np.dtype(
 _DEPTH = 0.37
 #: A jump between surfaces (m); the parts of one thing behind a thin post are at most so far apart (m, beams).
 _EDGE_M, _HIDDEN_M, _BRIDGE = 0.08, 0.15, 40
+#: What is seen in a mirror is what is seen directly if it is so near it (m, and share of the width).
+_SAME_M, _SAME = 0.06, 0.25
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
 _SMOOTH_M, _SMOOTH_PER_M = 0.006, 0.002
 
@@ -155,6 +157,28 @@ def _segment(
     return count
 
 
+@njit(cache=True)
+def _once(clusters: Any) -> int:
+    """Move what is seen directly, or in a mirror alone, to the front of ``clusters`` (m,); how many these are."""
+    kept = 0
+    for k in range(clusters.size):
+        c = clusters[k]
+        twice = False
+        if c.mirror >= 0:
+            for o in range(clusters.size):
+                p = clusters[o]
+                reach = _SAME_M + _SAME * max(c.width, p.width)
+                if p.mirror < 0 and np.hypot(c.x - p.x, c.y - p.y) < reach:
+                    twice = True
+        if twice:
+            # Otherwise one thing would be taken for two feet at one place.
+            continue
+        if kept != k:
+            clusters[kept] = c
+        kept += 1
+    return kept
+
+
 class Segmenter:
     """Clusters of one sensor's scans; the array of clusters is reused."""
 
@@ -167,4 +191,5 @@ class Segmenter:
     ) -> Any:
         """The clusters of one scan (m,) of ``CLUSTER``: ranges, states, claimed, longest (n,), rays (n, 10)."""
         count = _segment(ranges, states, claimed, longest, rays, self._step, self._grazing, self._clusters)
-        return self._clusters[:count]
+        clusters = self._clusters[:count]
+        return clusters[: _once(clusters)]

@@ -61,3 +61,24 @@ def test_nothing_gives_nothing_and_a_missing_beam_does_not_split() -> None:
     (cluster,) = clusters([(2.0, 1.5, 0.06)])
     middle = int(cluster["first"] + cluster["last"]) // 2
     assert len(clusters([(2.0, 1.5, 0.06)], {middle: float("nan")})) == 1
+
+
+def test_what_is_seen_directly_and_in_a_mirror_is_one() -> None:
+    """Two beams meet a disc at its middle: one directly, one by way of a mirror; a third sees another in the mirror."""
+    n = SENSOR.sweep.angles.size
+    ranges, states = np.full(n, 4.0), np.full(n, BACKGROUND, np.int8)
+    mirror = ((0.0, 3.0), (3.0, 3.0))
+    beams = rays(SENSOR, SENSOR.pose, [mirror])
+    places = []
+    for there, mirrored in (((1.5, 0.5), False), ((1.5, 0.52), True), ((1.0, 1.5), True)):
+        x, y = there[0], 6.0 - there[1] if mirrored else there[1]
+        bearing = math.atan2(y - SENSOR.pose[1], x - SENSOR.pose[0]) - SENSOR.pose[2]
+        k = int(np.argmin(np.abs(SENSOR.sweep.angles - bearing)))
+        ranges[k - 2 : k + 3], states[k - 2 : k + 3] = math.hypot(x - 0.05, y - 0.05), FOREGROUND
+        assert bool(beams[k, 8] < ranges[k]) == mirrored
+        places.append(there)
+    segment = Segmenter(np.abs(STEP), math.radians(15.0))
+    found = segment(ranges, states, np.zeros(n, np.bool_), np.full(n, 4.0), beams)
+    assert sorted(one["mirror"] >= 0 for one in found) == [False, True]
+    for one in found:
+        assert min(math.hypot(one["x"] - x, one["y"] - y) for x, y in (places[0], places[2])) < 0.05
