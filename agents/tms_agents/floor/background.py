@@ -19,6 +19,10 @@ _COMPONENTS = 4
 _SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 #: A settled component weighs so much; what intermittent beams show less often is not believed.
 _WEIGHT = 0.06
+#: A surface whose place has been looked past for so long (s) has gone.
+_GONE_S = 5.0
+#: The ranges of one surface differ so little from beam to beam (m).
+_SURFACE_M = 0.05
 
 
 @njit(cache=True)
@@ -38,13 +42,17 @@ def _classify(
     sigma: Array,
     weight: Array,
     empty: Array,
+    missing: Array,
     least: float,
     sigmas: float,
     threshold: float,
     states: States,
     longest: Array,
+    back: NDArray[np.bool_],
 ) -> None:
     """Fill ``states`` (n,) and ``longest`` (n,) m, the farthest background of each beam (inf: none).
+
+    ``back`` (n,) becomes which beams show nothing but what had gone.
 
     centre, sigma, weight: (n, k) components, m; empty: (n,) weight of no echo. A range is background if it is near a
     component of the beam or of one beside it (edges jitter), foreground if it is shorter than the longest component.
@@ -55,6 +63,7 @@ def _classify(
         if far == 0.0:
             far = np.inf
         longest[i] = far
+        back[i] = False
         r = ranges[i]
         if np.isnan(r):
             states[i] = UNKNOWN
@@ -63,6 +72,7 @@ def _classify(
             states[i] = NO_ECHO
             continue
         state = UNKNOWN
+        gone = True
         lowest, highest = np.inf, 0.0
         for b in range(max(0, i - 1), min(n, i + 2)):
             for j in range(k):
@@ -70,8 +80,10 @@ def _classify(
                     margin = max(threshold, sigmas * sigma[b, j])
                     if abs(r - centre[b, j]) <= margin:
                         state = BACKGROUND
+                        gone &= missing[b, j] > _GONE_S
                     lowest = min(lowest, centre[b, j] - margin)
                     highest = max(highest, centre[b, j] + margin)
+        back[i] = state == BACKGROUND and gone
         if state == UNKNOWN:
             for side in (-1, 1):
                 # A slanting wall goes on where something nearer ends.
@@ -89,6 +101,50 @@ def _classify(
             else:
                 state = BEYOND
         states[i] = state
+
+
+@njit(cache=True)
+def _shown(centre: Array, weight: Array, missing: Array, least: float, i: int, r: float) -> bool:
+    """Whether something that has gone was at the range r of beam i."""
+    if 0 <= i < centre.shape[0]:
+        for j in range(centre.shape[1]):
+            if weight[i, j] > least and missing[i, j] > _GONE_S and abs(centre[i, j] - r) < _SURFACE_M:
+                return True
+    return False
+
+
+@njit(cache=True)
+def _whole(
+    ranges: Array,
+    centre: Array,
+    weight: Array,
+    missing: Array,
+    least: float,
+    states: States,
+    back: NDArray[np.bool_],
+) -> None:
+    """What had gone comes back whole: else something new lies where it was, and its ``states`` (n,) are foreground."""
+    n = ranges.size
+    a = 0
+    while a < n:
+        if not back[a]:
+            a += 1
+            continue
+        b = a
+        while b + 1 < n and back[b + 1] and abs(ranges[b + 1] - ranges[b]) < _SURFACE_M:
+            b += 1
+        new = False
+        for edge, side in ((a, -1), (b, 1)):
+            r = ranges[edge]
+            past, beside = True, edge + side
+            for i in (beside, beside + side):
+                # The rest of its surface is still looked past.
+                past = past and _shown(centre, weight, missing, least, i, r) and ranges[i] > r + _SURFACE_M
+            wider = 0 <= beside < n and states[beside] == FOREGROUND and abs(ranges[beside] - r) < _SURFACE_M
+            new = new or past or wider
+        if new:
+            states[a : b + 1] = FOREGROUND
+        a = b + 1
 
 
 @njit(cache=True)
@@ -142,7 +198,8 @@ def _learn(
             if weight[i, j] > 0.0 and r > centre[i, j] + max(threshold, sigmas * sigma[i, j]):
                 missing[i, j] += dt
         if best >= 0:
-            missing[i, best] = 0.0
+            if states[i] != FOREGROUND:
+                missing[i, best] = 0.0
             weight[i, best] += rate
             gain = max(pull, rate)
             step = r - centre[i, best]
@@ -214,6 +271,7 @@ class Background:
         self.longest = np.full(n, np.inf)
         self.missing = np.zeros((n, _COMPONENTS))
         self.seconds = 0.0
+        self._back = np.zeros(n, np.bool_)
         self._scans = 0
 
     @property
@@ -237,12 +295,15 @@ class Background:
             self.sigma,
             self.weight,
             self.empty,
+            self.missing,
             least,
             self._settings.sigmas,
             self._settings.threshold_m,
             self.states,
             self.longest,
+            self._back,
         )
+        _whole(ranges, self.centre, self.weight, self.missing, least, self.states, self._back)
         return self.states
 
     def learn(self, ranges: Array, keep: NDArray[np.bool_], dt: float) -> None:

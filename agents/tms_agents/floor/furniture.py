@@ -87,7 +87,8 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
 
 def _legs(print_: Any, prints: Any) -> bool:
     """Whether the print and at least two others are thin, near each other, and stand there since the same time."""
-    if print_["width"] > _THIN_M:
+    if print_["width"] > _THIN_M or print_["given"] == 1:
+        # What was put down by somebody who stands beside it has not been pushed there.
         return False
     away = np.hypot(prints["x"] - print_["x"], prints["y"] - print_["y"])
     thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)

@@ -80,3 +80,20 @@ def test_furniture_is_adopted_at_once(learned: Background) -> None:
     scan = np.full(30, 3.0)
     scan[10:20] = 2.2
     assert (learned.classify(scan) == BACKGROUND).all()
+
+
+def test_what_has_gone_comes_back_whole_and_anything_less_is_something_new() -> None:
+    """A cupboard, ten beams wide, was moved away a while ago; a small thing lies where its front was."""
+    cupboard = np.full(30, 4.0)
+    cupboard[10:20] = 3.0
+    background = Background(30, FloorSettings())
+    learn(background, cupboard, 8.0)
+    learn(background, np.full(30, 4.0), 8.0)
+    assert (background.classify(cupboard) == BACKGROUND).all()
+    for beams in (slice(13, 16), slice(10, 13), slice(8, 22)):
+        scan = np.full(30, 4.0)
+        scan[beams] = 3.0
+        assert (background.classify(scan)[beams] == FOREGROUND).all()
+    hidden = cupboard.copy()
+    hidden[14:25] = 1.0
+    assert (background.classify(hidden)[10:14] == BACKGROUND).all()
