@@ -11,18 +11,22 @@ from numpy.typing import NDArray
 from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO
 
 Array = NDArray[np.float64]
+Point = tuple[float, float]
 
 #: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
 UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT = 0, 1, 2, 3, 4, 5
 
+#: What echoes less often is black or glossy.
+QUIET = 0.9
 #: Where nothing echoes behind it, a thing is missing when nothing echoes any more, if it did so reliably.
 _RELIABLE = 0.93
 
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range); no object is wider than this (m).
 _SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
 
-#: Beams that tell a shape.
-_PROFILE = 6
+#: Beams that tell a shape; a face slants if its ends are so differently far (share of the width); two faces stand out
+#: before the line between their ends by so much (mean, share of its length).
+_PROFILE, _SLANT, _CORNER = 6, 0.13, 0.25
 #: So many beams beside a thing do not show the background alone.
 _GUARD = 2
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
@@ -45,26 +49,39 @@ def beam_of(bearing: float, first: float, step: float, n: int) -> float:
 
 
 @njit(cache=True)
-def _depth(ranges: Array, a: int, b: int, width: float) -> float:
-    """How far behind its surface, beams a to b, the middle of a thing is, as a share of its width.
+def middle_of(ranges: Array, rays: Array, o: int, a: int, b: int, x: float, y: float, width: float) -> Point:
+    """Where the middle of a thing is whose surface, beams a to b, has the mean (x, y) m.
 
-    Of a disc 0.39: its ends are farther off, both alike. Boxes, which are seldom as deep as long, show a flat or a
-    slanting face: about 0.3 and 0.27.
+    Behind a disc's surface by 0.39 of its width: its ends are farther off, both alike. A box that shows two faces ends
+    at two opposite corners, and its middle is between them; of what shows one face nobody knows how deep it is, boxes
+    are seldom as deep as long: 0.3.
     """
     n = b - a + 1
     third = n // 3
-    if n < _PROFILE:
-        return 0.36
-    one, two, three = 0.0, 0.0, 0.0
-    for i in range(third):
-        one += ranges[a + i] / third
-        two += ranges[a + third + i] / third
-        three += ranges[b - i] / third
-    if not np.isfinite(one + two + three):
-        return 0.36
-    if abs(three - one) > 0.13 * width:
-        return 0.27
-    return 0.39 if 0.5 * (one + three) - two > 0.07 * width else 0.3
+    m = (a + b) // 2
+    dx, dy = rays[m, o + 2], rays[m, o + 3]
+    share = 0.36
+    if n >= _PROFILE:
+        one, two, three = 0.0, 0.0, 0.0
+        for i in range(third):
+            one += ranges[a + i] / third
+            two += ranges[a + third + i] / third
+            three += ranges[b - i] / third
+        if np.isfinite(one + two + three):
+            if abs(three - one) > _SLANT * width:
+                ax, ay = rays[a, o] + ranges[a] * rays[a, o + 2], rays[a, o + 1] + ranges[a] * rays[a, o + 3]
+                bx, by = rays[b, o] + ranges[b] * rays[b, o + 2], rays[b, o + 1] + ranges[b] * rays[b, o + 3]
+                length = max(np.hypot(bx - ax, by - ay), 1e-6)
+                nx, ny = (ay - by) / length, (bx - ax) / length
+                if nx * dx + ny * dy < 0.0:
+                    nx, ny = -nx, -ny
+                # How far the surface stands out before the line between its ends: by a corner, or not at all.
+                bulge = ((0.5 * (ax + bx) - x) * nx + (0.5 * (ay + by) - y) * ny) / length
+                back = 0.3 * min(length, 0.5) * (1.0 - min(max(bulge / _CORNER, 0.0), 1.0))
+                return 0.5 * (ax + bx) + back * nx, 0.5 * (ay + by) + back * ny
+            share = 0.39 if 0.5 * (one + three) - two > 0.07 * width else 0.3
+    shift = share * min(width, 0.5)
+    return x + shift * dx, y + shift * dy
 
 
 @njit(cache=True)
@@ -133,8 +150,6 @@ def look(
                     if a < 0:
                         a = i
                     b = i
-                elif states[i] == FOREGROUND and r < away + 0.3:
-                    alien += 1
                 if abs(i - middle) > inner:
                     continue
                 total += 1
@@ -171,6 +186,10 @@ def look(
                         claimed[i] = True
                         hits += 1
                         a, b = min(a, i), max(b, i)
+                for i in range(low, high + 1):
+                    # Something else right beside it.
+                    if (i < a or i > b) and states[i] == FOREGROUND and ranges[i] < away + 0.3:
+                        alien += 1
                 if out.verdict == HIT:
                     # Seen directly already: what a mirror shows is the same thing.
                     continue
@@ -178,11 +197,11 @@ def look(
                 out.n = hits
                 out.spacing = away * abs(step)
                 out.width = (b - a + 1) * out.spacing
-                m = (a + b) // 2
-                shift = _depth(ranges, a, b, out.width) * min(out.width, 0.5)
-                out.x = x / hits + shift * rays[m, o + 2]
-                out.y = y / hits + shift * rays[m, o + 3]
-                out.clean = 1 if alien == 0 and b - a + 1 == hits and not _cut(ranges, a, b) else 0
+                quiet = thing.rate < QUIET
+                # Of what is black or glossy a scan shows a part: how wide it is has been seen in others.
+                wide = max(out.width, 2.0 * thing.half) if quiet else out.width
+                out.x, out.y = middle_of(ranges, rays, o, a, b, x / hits, y / hits, wide)
+                out.clean = 1 if alien == 0 and (quiet or b - a + 1 == hits) and not _cut(ranges, a, b) else 0
                 continue
             if out.verdict == HIT:
                 continue
