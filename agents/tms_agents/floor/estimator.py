@@ -17,7 +17,7 @@ from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Masks
 from tms_agents.floor.objects import OBJECT, Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
-from tms_agents.floor.putting import set_aside
+from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure
@@ -123,6 +123,7 @@ class FloorEstimator:
         if recognize(bodies, *self._robots):
             self._association.decide()
         attend(prints, bodies, t)
+        count_feet(prints, bodies, t, dt)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
             for other in self._views.values():
                 other.move(self._extrinsics.pose(other.index))

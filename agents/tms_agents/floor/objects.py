@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
-from tms_agents.floor.freespace import FREE, HIT, SILENT
+from tms_agents.floor.freespace import FREE, HIT, QUIET, SILENT
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -23,10 +23,19 @@ _ARM_M, _FAR_M = 0.5, 1.6
 _SURE, _PER_SCAN = 7.5, 1.5
 #: Things overlap if they are nearer than this share of their half widths (and m).
 _OVERLAP, _BESIDE_M = 0.6, 0.01
-#: What echoes less often is black or glossy, and its parts are so near each other (m).
-_QUIET, _PARTS_M = 0.9, 0.1
+#: Parts of what is black or glossy are so near each other (m).
+_PARTS_M = 0.1
 #: One look is off by this at most (m).
 _TRUST_M = 0.04
+#: What is nobody's foot for so long (s), though somebody is there, is a thing.
+_SPARE_S = 2.0
+#: One beam is believed after so many hits; what has never been seen whole after so long (s).
+_SINGLE, _PART_S = 10, 4.0
+#: Somebody lost sight of so near (m) may still stand there for so long (s), on two feet so near each other (m) that are
+#: seen again at the same time (within s).
+_LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
+#: Nobody stands with the feet so far apart (m) for so long (s).
+_ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
 #: Surfaces lie this uncertain behind what is seen (m²).
 _SURFACE_VAR = 0.006**2
 
@@ -56,7 +65,12 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
                 gain = max(1.0 / (thing.hits + 1), 0.01)
                 thing.x += gain * _within(seen.x - thing.x)
                 thing.y += gain * _within(seen.y - thing.y)
-                thing.half += gain * _within(0.5 * seen.width - thing.half)
+                wider = 0.5 * seen.width - thing.half
+                if thing.rate >= QUIET:
+                    thing.half += gain * _within(wider)
+                elif wider > 0.0:
+                    # Now this part of it echoes, now that.
+                    thing.half += max(gain, 0.1) * _within(wider)
                 thing.var = _SURFACE_VAR + 1e-4 / (thing.hits + 1)
         elif seen.verdict == SILENT:
             # Black and glossy things do not always echo, but nothing is seen through them.
@@ -77,6 +91,70 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
 
 
 @njit(cache=True)
+def _somebodys(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
+    """Whether the print j may be a foot of somebody who was lost there: hidden in part, or there are two."""
+    lost = False
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
+            lost = True
+    if not lost or t - q.first > _STANDS_S:
+        return False
+    if q.whole < 0.5 * q.hits:
+        return True
+    for o in range(prints.size):
+        p = prints[o]
+        other = o != j and p.used and p.owner < 0 and t - p.last < 0.5 and abs(p.first - q.first) < _TOGETHER_S
+        if other and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _astride(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
+    """Whether the print j is taken for a foot of somebody whose other foot has stood for longer, too far away."""
+    body = bodies[q.owner]
+    other = body.b_print if body.a_print == j else body.a_print
+    if body.robot or other < 0 or other == j or not prints[other].used or t - q.first < _ASTRIDE_S or q.whole == 0:
+        return False
+    p = prints[other]
+    return bool(t - p.last < 0.3 and p.first <= q.first and np.hypot(p.x - q.x, p.y - q.y) > _ASTRIDE_M)
+
+
+@njit(cache=True)
+def _plain(q: Any, t: float, rest_s: float) -> bool:
+    """Whether enough has been seen of the print: so many beams, so often, and all of it."""
+    age = t - q.first
+    # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
+    # What is silent most of the time shows less of itself.
+    quiet = t - q.silent < 1.0 and q.hits >= 6
+    if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet:
+        return False
+    if q.beams < 1.5 and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks or q.hits < _SINGLE):
+        return False
+    # What has never been seen whole may be a part of anything: of a robot, of somebody's feet.
+    return bool(q.whole > 0 or quiet or age > (0.5 if q.given else 1.0) * _PART_S)
+
+
+@njit(cache=True)
+def _third(q: Any, bodies: Any, t: float, rest_s: float) -> bool:
+    """Whether the print came to somebody who stands on two other feet."""
+    third = False
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not body.used or not body.confirmed or body.stale or t - body.seen > 0.2:
+            continue
+        d = min(np.hypot(body.ax - q.x, body.ay - q.y), np.hypot(body.bx - q.x, body.by - q.y))
+        both = t - body.a_seen < 0.2 and t - body.b_seen < 0.2
+        came = t - q.first > 1.25 * rest_s and q.first > max(body.a_since, body.b_since)
+        if both and d > 0.15 + 0.5 * q.width and came:
+            third = True
+        elif np.hypot(body.x - q.x, body.y - q.y) < 0.6:
+            return False
+    return third
+
+
+@njit(cache=True)
 def _ripe(
     prints: Any, bodies: Any, t: float, rest_s: float, alone_s: float, width_m: float, ripe: NDArray[np.int64]
 ) -> int:
@@ -85,7 +163,11 @@ def _ripe(
     for j in range(prints.size):
         q = prints[j]
         ripe[j] = 0
-        if not q.used or q.owner >= 0 or t - q.last > 0.25 or q.revealed == 2:
+        # What is not there now may be a foot that has just been lifted.
+        if not q.used or q.last < t or q.revealed == 2:
+            continue
+        astride = q.owner >= 0 and _astride(q, prints, j, bodies, t)
+        if q.owner >= 0 and not astride:
             continue
         age = t - q.first
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
@@ -94,31 +176,14 @@ def _ripe(
             ripe[j] = FURNITURE
             count += 1
             continue
-        if q.spread > 0.03:
-            continue
-        # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
-        # What is silent most of the time shows less of itself.
-        quiet = t - q.silent < 1.0 and q.hits >= 6
-        if (q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet) or (
-            q.beams < 1.5 and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks)
-        ):
+        if q.spread > 0.03 or not _plain(q, t, rest_s):
             continue
         alone = t - q.busy > alone_s
-        third = False
-        for b in range(bodies.size):
-            body = bodies[b]
-            if not body.used or not body.confirmed or body.stale or t - body.seen > 0.2:
-                continue
-            d = min(np.hypot(body.ax - q.x, body.ay - q.y), np.hypot(body.bx - q.x, body.by - q.y))
-            both = t - body.a_seen < 0.2 and t - body.b_seen < 0.2
-            if both and d > 0.15 + 0.5 * q.width and age > 1.25 * rest_s and q.first > max(body.a_since, body.b_since):
-                third = True
-            elif np.hypot(body.x - q.x, body.y - q.y) < 0.6:
-                third = False
-                break
-        # A foot that has just been lifted is no object.
         given = q.given == 1 and age > 1.25 * rest_s
-        if not alone and not given and (not third or t - q.owned < alone_s):
+        nobodys = alone or given or astride or q.spare >= _SPARE_S
+        if not nobodys and (t - q.owned < alone_s or not _third(q, bodies, t, rest_s)):
+            continue
+        if _somebodys(q, prints, j, bodies, t):
             continue
         if q.width < width_m:
             ripe[j] = OBJECT
@@ -183,7 +248,7 @@ class Objects:
         things = self.things[self.things["used"] == 1]
         away = np.hypot(things["x"] - print_["x"], things["y"] - print_["y"])
         # Of what is black or glossy now this part echoes, now that.
-        quiet = (things["rate"] < _QUIET) | (print_["silent"] > print_["first"])
+        quiet = (things["rate"] < QUIET) | (print_["silent"] > print_["first"])
         beside = np.where(quiet, _PARTS_M, _BESIDE_M)
         return bool((away < _OVERLAP * (things["half"] + 0.5 * print_["width"]) + beside).any())
 

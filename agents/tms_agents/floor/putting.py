@@ -1,4 +1,4 @@
-"""What appears beside somebody who stands on both feet was put there by hand: it is nobody's foot."""
+"""Nobody has three feet: what appears or lies beside somebody both of whose feet are seen is a thing."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ _STANDS_S, _NEW_S = 0.4, 0.15
 _STEP_M, _REACH_M, _BESIDE_M = 0.3, 0.85, 0.16
 #: Somebody else so near (m) may have stepped there.
 _OTHER_M = 1.0
+#: Two feet are between these distances from each other (m).
+_FEET_M = (0.06, 0.7)
+#: A print so near (m) may be the other foot of somebody who is not known yet.
+_PAIR_M = 0.45
 
 
 @njit(cache=True)
@@ -46,6 +50,48 @@ def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
         elif away < _OTHER_M:
             return False
     return giver >= 0
+
+
+@njit(cache=True)
+def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
+    """Note in ``spare`` for how long each print has been nobody's while everybody near it shows both feet elsewhere."""
+    for j in range(prints.size):
+        q = prints[j]
+        if not q.used:
+            continue
+        if q.first == q.last or q.owner >= 0:
+            q.spare = 0.0
+            continue
+        if q.last != t:
+            continue
+        shown = False
+        for b in range(bodies.size):
+            body = bodies[b]
+            away = np.hypot(body.x - q.x, body.y - q.y)
+            if not body.used or away > _OTHER_M or (body.stale and t - body.seen > 10.0):
+                continue
+            apart = np.hypot(body.ax - body.bx, body.ay - body.by)
+            near = min(np.hypot(body.ax - q.x, body.ay - q.y), np.hypot(body.bx - q.x, body.by - q.y))
+            shown = (
+                body.confirmed
+                and not body.robot
+                and not body.stale
+                and body.a_print != body.b_print
+                and t - min(body.a_seen, body.b_seen) < _NEW_S
+                and _FEET_M[0] < apart < _FEET_M[1]
+                and near > _BESIDE_M + 0.5 * q.width
+            )
+            if not shown:
+                break
+        if shown:
+            for o in range(prints.size):
+                p = prints[o]
+                pair = o != j and p.used and p.owner < 0 and p.revealed != 2 and t - p.last < 0.3
+                if pair and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
+                    shown = False
+                    break
+        if shown:
+            q.spare += dt
 
 
 @njit(cache=True)

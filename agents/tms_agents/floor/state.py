@@ -10,7 +10,8 @@ import numpy as np
 #: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
 #: (x, y) m mean of where it was seen, first and last time seen, hits and looks (scans since), width m, spread m (mean
 #: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), freed (when a body was last
-#: near), touched (label of the last owner), beams of the last sighting.
+#: near), touched (label of the last owner), spare (s for which somebody beside it has shown two other feet), beams of
+#: the last sighting.
 PRINT = np.dtype(
     [
         ("used", "i8"),
@@ -32,6 +33,7 @@ PRINT = np.dtype(
         ("busy", "f8"),
         ("revealed", "i8"),
         ("given", "i8"),
+        ("spare", "f8"),
         ("silent", "f8"),
         ("still_x", "f8"),
         ("still_y", "f8"),

@@ -35,6 +35,14 @@ def test_a_thing_is_told_while_who_put_it_still_stands_there() -> None:
     assert put.candidates[0][0] == who.label
 
 
+def test_nobody_has_three_feet() -> None:
+    """It was put there before the person stood still, so that it might have been a foot at first."""
+    _, events = Room(together(walker(STAYS), thing(1.85, 2.0, 0.05, 11.4))).play(30.0)
+    (put,) = born(events, "object")
+    assert math.hypot(put.xy[0] - 1.85, put.xy[1] - 2.0) < 0.02
+    assert put.t < 18.0
+
+
 def test_feet_that_stand_for_long_are_no_things() -> None:
     _, events = Room(walker(STAYS)).play(40.0)
     assert not born(events, "object")
