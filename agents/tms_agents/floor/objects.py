@@ -172,7 +172,8 @@ def _ripe(
         age = t - q.first
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
-        if q.attached > 0.5:
+        # What somebody put down may touch a wall.
+        if q.attached > 0.5 and q.given == 0:
             ripe[j] = FURNITURE
             count += 1
             continue
