@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.freespace import FREE, clear
+from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import learn
@@ -27,6 +28,8 @@ _NEAR_M, _ALIKE = 0.08, 0.3
 _MISS = 2.0
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
+#: What belongs to a name, not to the body that has it.
+NAMED = ("label", "first", "own", "own_n", "own_pace", "own_pace_n", "told_x", "told_y", "told_at")
 _BLANK = np.zeros(1, CLUSTER)
 
 
@@ -150,19 +153,21 @@ def _complete(
 
 
 @njit(cache=True)
-def _same(one: Any, two: Any) -> bool:
-    """Whether two hypotheses put the movers at the same places on the same prints, whoever is who.
+def _same(one: Any, two: Any, of: NDArray[np.int64]) -> bool:
+    """Whether two hypotheses put the movers at the same places on the same prints, whoever is who; ``of`` (n,) tells.
 
-    Then nothing that comes can tell them apart: which of them is right has to be decided by what has been.
+    Then the way people go on cannot tell them apart: only how they look and walk can (`identity`).
     """
     for b in range(one.size):
         p = one[b]
+        of[b] = -1
         if not (p.used and p.confirmed):
             continue
         found = False
         for o in range(two.size):
             # Most often it is the same one.
             q = two[(b + o) % two.size]
+            of[b] = (b + o) % two.size
             if not (q.used and q.confirmed):
                 continue
             near = _NEAR_M if p.a_print < 0 and p.b_print < 0 else 4.0 * _NEAR_M
@@ -193,11 +198,12 @@ def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float
 
 
 @njit(cache=True)
-def _copy(source: Any, target: Any) -> None:
-    """Copy the bodies that are used."""
+def _copy(source: Any, source_belief: Array, target: Any, target_belief: Array) -> None:
+    """Copy the bodies that are used, and who they may be."""
     for b in range(source.size):
         if source[b].used:
             target[b] = source[b]
+            target_belief[b] = source_belief[b]
         else:
             target[b].used = 0
 
@@ -206,6 +212,8 @@ def _copy(source: Any, target: Any) -> None:
 def _advance(
     hypotheses: Any,
     spare: Any,
+    beliefs: Array,
+    spare_beliefs: Array,
     scores: Array,
     count: int,
     clusters: Any,
@@ -265,6 +273,7 @@ def _advance(
                 child_score[children], child_parent[children] = scores[h] + total, h
                 child_columns[children] = other
                 children += 1
+    other_of, scratch = np.empty(n, np.int64), np.empty((2, n))
     owned = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_)
     order = np.argsort(child_score[:children])
     kept = 0
@@ -274,27 +283,29 @@ def _advance(
             break
         bodies = spare[kept]
         parent = hypotheses[child_parent[o]]
-        _copy(parent, bodies)
+        _copy(parent, beliefs[child_parent[o]], bodies, spare_beliefs[kept])
         k = _rows(bodies, 1, rows)
         free = np.ones(m, np.bool_)
         _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t)
         _complete(bodies, clusters, of, marks, free, blank, prints, t)
         missed = _missed(bodies, rows[:k], t, sight)
         known_already = False
+        score = child_score[o] - least + missed
         for j in range(kept):
-            if _same(spare[j], bodies):
+            if _same(spare[j], bodies, other_of):
+                unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, score - scores[j], scratch)
                 known_already = True
                 break
         if known_already:
             continue
         for i in range(m):
             owned[kept, i] = not free[i]
-        scores[kept] = child_score[o] - least + missed
+        scores[kept] = score
         kept += 1
     best = int(np.argmin(scores[:kept]))
     for h in range(kept):
         source = best if h == 0 else (0 if h == best else h)
-        _copy(spare[source], hypotheses[h])
+        _copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h])
     scores[0], scores[best] = scores[best], scores[0]
     scores[:kept] -= scores[0]
     for i in range(m):
@@ -307,6 +318,9 @@ class Association:
 
     def __init__(self, most: int) -> None:
         self._hypotheses, self._spare = empty(BODY, (_KEPT, most)), empty(BODY, (_KEPT, most))
+        self._beliefs, self._spare_beliefs = np.zeros((_KEPT, most, most)), np.zeros((_KEPT, most, most))
+        self._beliefs[:] = np.eye(most)
+        self._names = np.zeros(most, np.int64)
         self._scores = np.zeros(_KEPT)
         self._count = 1
         self.bodies = self._hypotheses[0]
@@ -319,6 +333,8 @@ class Association:
         self._count = _advance(
             self._hypotheses,
             self._spare,
+            self._beliefs,
+            self._spare_beliefs,
             self._scores,
             self._count,
             clusters,
@@ -336,6 +352,22 @@ class Association:
         """From now on only the best hypothesis counts."""
         self._count = 1
         self._scores[0] = 0.0
+
+    def named(self, index: int, lost: tuple[float, float] | None = None) -> None:
+        """The mover at ``index`` has a name of its own, or that of one who was ``lost`` at (x, y) m."""
+        self.decide()
+        christen(self.bodies, self._beliefs[0], index, *((np.nan, np.nan) if lost is None else lost))
+
+    def rename(self, t: float) -> None:
+        """Give people their own names back."""
+        if not renamed(self.bodies, self._beliefs[0], t, self._names):
+            return
+        changed = np.flatnonzero(self._names != np.arange(self._names.size))
+        source = self._names[changed]
+        for bodies, belief in zip(self._hypotheses[: self._count], self._beliefs[: self._count], strict=True):
+            for field in NAMED:
+                bodies[field][changed] = bodies[field][source]
+            belief[:, changed] = belief[:, source]
 
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""

@@ -99,6 +99,8 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
     body.shoe = 0.0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
+    body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
+    body.look, body.look_n, body.sure = 0.0, 0, 1.0
 
 
 @njit(cache=True)

@@ -16,6 +16,12 @@ from numba import njit
 _SWING_M, _STANCE_M = 0.05, 0.12
 #: A shoe seems to move so far (m) when it rolls off. Of such a share of wide feet somebody's shoes are seen, not legs.
 _ROLL_M, SHOES, _SHOE_M = 0.17, 0.3, (0.16, 0.34)
+#: A foot stands and swings for so long (s) while somebody walks.
+_STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
+#: So many stances tell somebody's beat of late, and his own.
+_PACE_MEMORY, _PACE_LIFE = 12, 80
+#: Whose name is less sure does not change what is known of the name.
+SURE = 0.6
 NOTHING = (0.0, 0.0, np.inf, 0.0, 0.0, np.inf)
 
 
@@ -59,6 +65,7 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
         return
     elsewhere = _ROLL_M if body.shoe >= SHOES else _STANCE_M
     if np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0:
+        beat(body, body.a_stood - body.a_land, since - body.a_stood)
         body.a_ox, body.a_oy = body.a_px, body.a_py
         body.a_px, body.a_py = c.x, c.y
         body.a_land = since if t - since < 0.5 or body.a_stood < 0.0 else t
@@ -66,6 +73,18 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
         body.a_px += 0.4 * (c.x - body.a_px)
         body.a_py += 0.4 * (c.y - body.a_py)
     body.a_stood = t
+
+
+@njit(cache=True)
+def beat(body: Any, stood: float, swung: float) -> None:
+    """Learn from a stance of ``stood`` s, before a swing of ``swung`` s, at what beat the body walks."""
+    if _STANCE_S[0] < stood < _STANCE_S[1] and _SWING_S[0] < swung < _SWING_S[1]:
+        body.pace_n = min(body.pace_n + 1, _PACE_MEMORY)
+        body.pace += (stood - body.pace) / body.pace_n
+        if body.sure < SURE:
+            return
+        body.own_pace_n = min(body.own_pace_n + 1, _PACE_LIFE)
+        body.own_pace += (stood - body.own_pace) / body.own_pace_n
 
 
 @njit(cache=True)

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.gait import SURE
+
 Array = NDArray[np.float64]
 
 #: The light that comes back falls with the range by this power (Kyushu University, `irvs/ros_tms`, tms_ss_fss).
@@ -16,8 +18,8 @@ _FALL = 0.287
 _PATCHES, _BEAM, _PEOPLE = 0.12, 0.15, 0.4
 #: What is known of somebody never counts as better than this many sightings; the least that tell anything.
 _MEMORY, _LEAST = 40, 4
-#: So many sightings make somebody's own look; it changes by so much as he turns; log likelihood ratio of an exchange.
-_LIFE, _LOOKS, _EXCHANGED = 1200, 0.08, 2.5
+#: So many sightings make somebody's own look.
+_LIFE = 1200
 #: Scans of one foot resemble each other: each tells so much only, and nothing tells more than so many deviations.
 _SHARE, _FAR = 0.5, 3.5
 
@@ -65,31 +67,8 @@ def learn(body: Any, value: float, variance: float) -> None:
         return
     body.shine_n = min(body.shine_n + 1, _MEMORY)
     body.shine += (value - body.shine) / body.shine_n
-    body.own_n = min(body.own_n + 1, _LIFE)
-    body.own += (value - body.own) / body.own_n
-
-
-@njit(cache=True)
-def exchanged(bodies: Any, t: float) -> tuple[int, int]:
-    """Two people who look like each other since a while, not like themselves: names were exchanged; or (-1, -1)."""
-    best, one, two = _EXCHANGED, -1, -1
-    for b in range(bodies.size):
-        p = bodies[b]
-        if not _known(p, t):
-            continue
-        for o in range(b + 1, bodies.size):
-            q = bodies[o]
-            if not _known(q, t):
-                continue
-            # Of (p own, q own) and (q own, p own): the sum of squares differs by this.
-            gain = (p.own - q.own) * (q.shine - p.shine) / _LOOKS**2
-            if gain > best:
-                best, one, two = gain, b, o
-    return one, two
-
-
-@njit(cache=True)
-def _known(body: Any, t: float) -> bool:
-    """Whether this is a person who is seen, now and for long."""
-    person = body.used and body.confirmed and not body.robot and t - body.seen < 1.0
-    return bool(person and body.shine_n >= _MEMORY and body.own_n >= 2 * _MEMORY)
+    body.look_n = min(body.look_n + 1, 3 * _MEMORY)
+    body.look += (value - body.look) / body.look_n
+    if body.sure >= SURE:
+        body.own_n = min(body.own_n + 1, _LIFE)
+        body.own += (value - body.own) / body.own_n

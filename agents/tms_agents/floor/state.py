@@ -45,7 +45,9 @@ PRINT = np.dtype(
 )
 
 #: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began,
-#: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown).
+#: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
+#: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
+#: who it is (look, pace), and of the one whose name it has (own, own_pace); sure is how likely that name is.
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -118,6 +120,13 @@ BODY = np.dtype(
         ("shine_n", "i8"),
         ("own", "f8"),
         ("own_n", "i8"),
+        ("pace", "f8"),
+        ("pace_n", "i8"),
+        ("own_pace", "f8"),
+        ("own_pace_n", "i8"),
+        ("look", "f8"),
+        ("look_n", "i8"),
+        ("sure", "f8"),
     ]
 )
 

@@ -10,13 +10,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.absent import Absent
 from tms_agents.floor.association import Association
 from tms_agents.floor.bodies import misled, stuck
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.masks import Area
 from tms_agents.floor.settings import FloorSettings, Scene
-from tms_agents.floor.shine import exchanged
 
 Array = NDArray[np.float64]
 
@@ -181,6 +181,7 @@ class Tracks:
         self._seats, self._gates = Area(scene.seats), Area(scene.gates)
         self._region = Area([] if scene.region is None else [scene.region])
         self._robots = [tuple(sorted(size)) for size in scene.robots]
+        self._absent = Absent(self._gates)
         self._actions = np.zeros(self.bodies.size, np.int64)
 
     def review(
@@ -213,8 +214,8 @@ class Tracks:
             bool(self._region.polygons),
             learned,
         )
-        self._rename(t)
-        events: list[FloorEvent] = self._unite(t)
+        self._association.rename(t)
+        events: list[FloorEvent] = self._absent.gone(t) + self._unite(t)
         for index in np.flatnonzero(self._actions).tolist():
             body, action = self.bodies[index], self._actions[index]
             if action == _GONE:
@@ -266,17 +267,9 @@ class Tracks:
             body["clear"] = 0.0
             return self._lost(index, t)
         self._association.forget(index)
+        if body["clear"] > self._settings.leave_s and self._absent.keep(body):
+            return [] if body["stale"] else [Stale(t, int(body["label"]))]
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
-
-    def _rename(self, t: float) -> None:
-        """Give two people back their own names."""
-        one, two = exchanged(self.bodies, t)
-        if one < 0:
-            return
-        self._association.decide()
-        for field in ("label", "first", "own", "own_n", "told_x", "told_y", "told_at"):
-            values = self.bodies[field]
-            values[[one, two]] = values[[two, one]]
 
     def _unite(self, t: float) -> list[FloorEvent]:
         """Two movers with one foot each at one place are one: the younger label goes."""
@@ -290,7 +283,8 @@ class Tracks:
                 if near and one["used"] and two["used"] and one["label"] < two["label"]:
                     self._association.decide()
                     self._association.forget(index)
-                    events.append(Vanished(t, int(two["label"]), float(two["seen"]), t))
+                    if not self._absent.keep(two):
+                        events.append(Vanished(t, int(two["label"]), float(two["seen"]), t))
         return events
 
     def _lost(self, index: int, t: float) -> list[FloorEvent]:
@@ -341,14 +335,20 @@ class Tracks:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
         old = self._missing(body)
+        if old is None:
+            old = self._absent.find(body)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
+            for field in ("own", "own_n", "own_pace", "own_pace_n"):
+                body[field] = old[field]
             old["used"] = 0
             body["confirmed"], body["label"], body["first"] = 1, label, first
+            self._association.named(index, _xy(old))
             body["robot"] = old["robot"]
             _told(body, t)
             return [Back(t, label, _xy(body))] if stale else [Moved(t, label, _xy(body), _cov(body))]
         body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
+        self._association.named(index)
         _told(body, t)
         width = float(body["width"])
         since = float(body["first"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.shine import exchanged, learn, measure, unlike
+from tms_agents.floor.shine import learn, measure, unlike
 from tms_agents.floor.state import BODY, empty
 
 VARIANCE = 0.01
@@ -24,7 +24,7 @@ def people(*brightness: float):
     bodies = empty(BODY, len(brightness))
     for body, value in zip(bodies, brightness, strict=True):
         body["used"] = body["confirmed"] = 1
-        body["seen"] = 1.0
+        body["seen"] = body["sure"] = 1.0
         for _ in range(400):
             learn(body, value, VARIANCE)
     return bodies
@@ -47,18 +47,10 @@ def test_somebody_of_another_brightness_is_less_likely() -> None:
     assert unlike(body, 7.0, VARIANCE) < 0.0 < unlike(body, 6.3, VARIANCE)
 
 
-def test_names_are_exchanged_when_two_look_like_each_other() -> None:
-    bodies = people(7.4, 6.8)
-    assert exchanged(bodies, 1.0) == (-1, -1)
-    for body, value in zip(bodies, (6.8, 7.4), strict=True):
-        for _ in range(80):
-            learn(body, value, VARIANCE)
-    assert exchanged(bodies, 1.0) == (0, 1)
-
-
-def test_who_looks_alike_keeps_his_name() -> None:
-    bodies = people(7.0, 7.05)
-    for body, value in zip(bodies, (7.05, 7.0), strict=True):
-        for _ in range(80):
-            learn(body, value, VARIANCE)
-    assert exchanged(bodies, 1.0) == (-1, -1)
+def test_what_is_known_of_a_name_that_is_unsure_stays() -> None:
+    (body,) = people(7.0)
+    body["sure"] = 0.3
+    for _ in range(80):
+        learn(body, 6.3, VARIANCE)
+    assert body["own"] == pytest.approx(7.0)
+    assert body["look"] < 6.7

@@ -1,0 +1,71 @@
+"""Who is lost in the middle of a room is somewhere in it."""
+
+from __future__ import annotations
+
+import pytest
+
+from tms_agents.floor.absent import Absent
+from tms_agents.floor.events import Vanished
+from tms_agents.floor.masks import Area
+from tms_agents.floor.state import BODY, empty
+
+DOOR = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+
+
+def person(x: float, y: float, *, label: int = 1, seen: float = 10.0, first: float = 0.0, own: float = 7.0):
+    (body,) = empty(BODY, 1)
+    body["used"] = body["confirmed"] = 1
+    body["label"], body["x"], body["y"], body["x0"], body["y0"] = label, x, y, x, y
+    body["seen"], body["first"], body["hits"] = seen, first, 100
+    body["own"], body["own_n"], body["look"], body["look_n"] = own, 200, own, 50
+    return body
+
+
+@pytest.fixture
+def absent() -> Absent:
+    return Absent(Area([DOOR]))
+
+
+def test_who_turns_up_again_has_his_name(absent: Absent) -> None:
+    assert absent.keep(person(4.0, 4.0, label=3))
+    assert absent.find(person(5.0, 4.0, first=12.0))["label"] == 3
+    assert absent.find(person(5.0, 4.0, first=12.0)) is None
+
+
+def test_who_is_lost_at_the_door_has_left(absent: Absent) -> None:
+    assert not absent.keep(person(0.8, 0.0))
+
+
+def test_who_comes_in_at_the_door_is_somebody_new(absent: Absent) -> None:
+    absent.keep(person(2.0, 0.0))
+    assert absent.find(person(0.8, 0.0, first=12.0)) is None
+
+
+def test_without_doors_people_may_leave_anywhere() -> None:
+    assert not Absent(Area([])).keep(person(4.0, 4.0))
+
+
+def test_a_glimpse_is_nobody(absent: Absent) -> None:
+    glimpse = person(4.0, 4.0)
+    glimpse["hits"] = 10
+    assert not absent.keep(glimpse)
+
+
+def test_who_is_too_far_away_or_looks_otherwise_is_somebody_else(absent: Absent) -> None:
+    absent.keep(person(4.0, 4.0))
+    assert absent.find(person(9.0, 4.0, first=11.0)) is None
+    assert absent.find(person(4.5, 4.0, first=11.0, own=6.0)) is None
+    assert absent.find(person(4.5, 4.0, first=11.0)) is not None
+
+
+def test_of_two_the_one_who_looks_like_it(absent: Absent) -> None:
+    absent.keep(person(4.0, 4.0, label=1, own=7.3))
+    absent.keep(person(4.2, 4.0, label=2, own=7.1))
+    assert absent.find(person(4.0, 4.0, first=11.0, own=7.1))["label"] == 2
+
+
+def test_who_does_not_turn_up_has_left(absent: Absent) -> None:
+    absent.keep(person(4.0, 4.0, label=5))
+    assert absent.gone(25.0) == []
+    assert absent.gone(31.0) == [Vanished(31.0, 5, 10.0, 31.0)]
+    assert absent.gone(32.0) == []
