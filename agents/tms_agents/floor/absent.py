@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
+from tms_agents.floor.state import BODY, empty, pack, unpack
 
 #: So near a door (m) people come and go.
 _DOOR_M = 1.0
@@ -20,10 +23,7 @@ _UNLIKE = -4.0
 
 
 class Absent:
-    """``gates``: the doors. Where they are not known, people may come and go anywhere, and nobody is waited for.
-
-    Across a restart this is forgotten: whoever turns up then is new.
-    """
+    """``gates``: the doors. Where they are not known, people may come and go anywhere, and nobody is waited for."""
 
     def __init__(self, gates: Area) -> None:
         self._gates = gates
@@ -37,6 +37,14 @@ class Absent:
             self._bodies.append(body.copy())
             self._bodies[-1]["stale"] = 1
         return bool(inside and somebody)
+
+    def save(self) -> dict[str, Any]:
+        """JSON values."""
+        return pack(np.array(self._bodies, BODY))
+
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        self._bodies = list(unpack(saved, empty(BODY, int(saved["shape"][0]))))
 
     def find(self, body: Any) -> Any:
         """Who of those waited for this new one most probably is, or None."""

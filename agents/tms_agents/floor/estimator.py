@@ -198,6 +198,7 @@ class FloorEstimator:
             "format": 1,
             "sensors": sensors,
             "bodies": pack(self._tracks.bodies),
+            "absent": self._tracks.absent.save(),
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
@@ -234,6 +235,7 @@ class FloorEstimator:
                 view.last = saved["last"]
                 view.move(tuple(saved["pose"]))
             self._tracks.bodies[:] = unpack(state["bodies"], self._tracks.bodies)
+            self._tracks.absent.restore(state["absent"])
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}

@@ -181,7 +181,7 @@ class Tracks:
         self._seats, self._gates = Area(scene.seats), Area(scene.gates)
         self._region = Area([] if scene.region is None else [scene.region])
         self._robots = [tuple(sorted(size)) for size in scene.robots]
-        self._absent = Absent(self._gates)
+        self.absent = Absent(self._gates)
         self._actions = np.zeros(self.bodies.size, np.int64)
 
     def review(
@@ -215,7 +215,7 @@ class Tracks:
             learned,
         )
         self._association.rename(t)
-        events: list[FloorEvent] = self._absent.gone(t) + self._unite(t)
+        events: list[FloorEvent] = self.absent.gone(t) + self._unite(t)
         for index in np.flatnonzero(self._actions).tolist():
             body, action = self.bodies[index], self._actions[index]
             if action == _GONE:
@@ -267,7 +267,7 @@ class Tracks:
             body["clear"] = 0.0
             return self._lost(index, t)
         self._association.forget(index)
-        if body["clear"] > self._settings.leave_s and self._absent.keep(body):
+        if body["clear"] > self._settings.leave_s and self.absent.keep(body):
             return [] if body["stale"] else [Stale(t, int(body["label"]))]
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
 
@@ -283,7 +283,7 @@ class Tracks:
                 if near and one["used"] and two["used"] and one["label"] < two["label"]:
                     self._association.decide()
                     self._association.forget(index)
-                    if not self._absent.keep(two):
+                    if not self.absent.keep(two):
                         events.append(Vanished(t, int(two["label"]), float(two["seen"]), t))
         return events
 
@@ -336,7 +336,7 @@ class Tracks:
             body["from_furniture"] = -1
         old = self._missing(body)
         if old is None:
-            old = self._absent.find(body)
+            old = self.absent.find(body)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
             for field in ("own", "own_n", "own_pace", "own_pace_n"):

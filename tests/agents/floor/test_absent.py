@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from tms_agents.floor.absent import Absent
@@ -69,3 +71,17 @@ def test_who_does_not_turn_up_has_left(absent: Absent) -> None:
     assert absent.gone(25.0) == []
     assert absent.gone(31.0) == [Vanished(31.0, 5, 10.0, 31.0)]
     assert absent.gone(32.0) == []
+
+
+def test_who_is_waited_for_is_so_after_a_restart(absent: Absent) -> None:
+    absent.keep(person(4.0, 4.0, label=5))
+    absent.keep(person(7.0, 4.0, label=6))
+    again = Absent(Area([DOOR]))
+    again.restore(json.loads(json.dumps(absent.save())))
+    assert again.find(person(4.5, 4.0, first=12.0))["label"] == 5
+    assert again.gone(31.0) == [Vanished(31.0, 6, 10.0, 31.0)]
+
+
+def test_nobody_is_saved_too(absent: Absent) -> None:
+    absent.restore(absent.save())
+    assert absent.gone(1e6) == []
