@@ -57,7 +57,7 @@ class Episode:
 
     level: Array
     variance: Array
-    things: Sequence[Thing]
+    things: list[Thing]
     onset: float
     way: list[tuple[Array, Array]] = field(default_factory=list)
 

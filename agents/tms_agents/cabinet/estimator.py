@@ -13,7 +13,7 @@ from tms_agents.cabinet.balance import Balance, search
 from tms_agents.cabinet.blocks import Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
 from tms_agents.cabinet.caution import IN_HAND_S, Caution
-from tms_agents.cabinet.events import CabinetEvent, Stay
+from tms_agents.cabinet.events import CabinetEvent, Stay, Vanished
 from tms_agents.cabinet.fusion import Evidence, Explanation, explain
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
 from tms_agents.cabinet.hindsight import Hindsight
@@ -129,7 +129,7 @@ class CabinetEstimator:
         if zone not in self._zones:
             raise ValueError(f"there is no zone {zone!r}")
         self._presence.see(t, zone, tags)
-        return self._namer.update(t, resting=self._detector.resting)
+        return self._name(t)
 
     def know(self, tag: str, weight: KnownWeight) -> None:
         """What the object with this tag weighs, from the object database."""
@@ -267,7 +267,12 @@ class CabinetEstimator:
         self._detector.accept(step)
         self._rested, self._book.settling = step.settled, None
         events = self._hindsight.tell(outcome, step.now)
-        return events + self._namer.update(step.now, resting=self._detector.resting)
+        return events + self._name(step.now)
+
+    def _name(self, t: float) -> list[CabinetEvent]:
+        events = self._namer.update(t, resting=self._detector.resting)
+        self._hindsight.forget({event.stay for event in events if isinstance(event, Vanished)})
+        return events
 
     def _whole(self, step: Step) -> Step | None:
         """All that the stays and the zeros leave unexplained after ``step``, not only what is new."""
@@ -293,7 +298,7 @@ class CabinetEstimator:
         events = self._book.apply(step, explanation)
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
-        return events + self._namer.update(step.now, resting=self._detector.resting)
+        return events + self._name(step.now)
 
     def _evidence(self, step: Step) -> Evidence:
         settling = self._book.settling

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +42,7 @@ _MOST_REVISIONS = 2
 #: So long before the load changes the tag of what is brought may come into view.
 _BROUGHT_S = 3.0
 #: Rounds go wrong in ways of their own: no tag's evidence counts more than this.
-_MOST_ODDS = 12.0
+_MOST_ODDS = 16.0
 
 Told = tuple[frozenset[int], tuple[str | None, ...]]
 
@@ -73,6 +73,12 @@ class Hindsight:
     def interrupt(self) -> None:
         """Samples are missing, and the zeros may have jumped meanwhile."""
         self._uncertain = True
+
+    def forget(self, stays: Set[int]) -> None:
+        """Stays that were over long before: it was found out by their tags, and the load tells nothing of them."""
+        for things in (self._before, None if self._episode is None else self._episode.things):
+            if things is not None:
+                things[:] = [thing for thing in things if thing.id not in stays]
 
     def rest(
         self, t: float, level: Array, variance: Array, seconds: float, rested: float, *, shaking: bool
