@@ -31,6 +31,8 @@ from tms_client.errors import (
 from tms_client.flows import Retry
 from tms_client.grasping import Gripper
 from tms_client.hands import AsyncHand, Hand
+from tms_client.maps.awaited import AsyncMap
+from tms_client.maps.blocking import Map
 from tms_client.posting import AsyncPoster, Poster
 from tms_client.spool import DeadLetter, Spool
 from tms_client.town import Town
@@ -38,6 +40,7 @@ from tms_client.town import Town
 __all__ = [
     "Ambiguous",
     "AsyncHand",
+    "AsyncMap",
     "AsyncPoster",
     "AsyncTown",
     "BadAnswer",
@@ -50,6 +53,7 @@ __all__ = [
     "Hand",
     "Invalid",
     "Location",
+    "Map",
     "NotFound",
     "Pace",
     "Poster",

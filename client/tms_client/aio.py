@@ -26,6 +26,7 @@ from tms_client.flows import Flow, Retry
 from tms_client.grasping import Onto
 from tms_client.hands import AsyncHand, AsyncRunning, Hands, only_one, place, plan
 from tms_client.live import Endpoint, LiveFrame, follow_async, subscription
+from tms_client.maps.awaited import AsyncMap, AsyncMaps
 from tms_client.posting import AsyncPoster
 from tms_client.spool import Spool
 from tms_schemas.agents import AgentView
@@ -72,6 +73,7 @@ class AsyncTown:
         self.products = Products(self._connection, self._api)
         self.rooms = Rooms(self._connection, self._api)
         self.agents = Agents(self._connection, self._api)
+        self.maps = AsyncMaps(self._connection, self._api)
         self._agents: dict[str, AsyncRunning] = {}
         self._opening = asyncio.Lock()
 
@@ -96,6 +98,15 @@ class AsyncTown:
             Ambiguous, NotFound: several objects fit equally well, or none; the message names the candidates.
         """
         return await self._run(lookup.where(self._api, name, at))
+
+    async def map(self, name: str, *, version: int | None = None) -> AsyncMap:
+        """A map as numpy arrays, the newest version by default; its ``update()`` fetches only what changed.
+
+        Raises:
+            NotFound: there is no such map or version.
+            TownError: numpy is missing (it comes with the extra ``maps``).
+        """
+        return await self.maps.fetch(name, version)
 
     async def intake(
         self,

@@ -14,6 +14,19 @@ from tms_client.answers import Location
 from tms_client.flows import Call, Flow, Retry, as_model, exchange, nothing
 from tms_schemas.agents import AgentPage, AgentView
 from tms_schemas.belief import AnomaliesAnswer, LabelsAnswer, MoversAnswer, PlacementsAnswer
+from tms_schemas.maps import (
+    MapDiff,
+    MapIn,
+    MapObjects,
+    MapPage,
+    MapVersion,
+    TilePage,
+    TilesKept,
+    TileUpload,
+    TownMap,
+    VersionIn,
+    VersionPage,
+)
 from tms_schemas.objects import (
     CatalogueImport,
     IntakeRequest,
@@ -128,6 +141,54 @@ class Api:
 
     def anomalies(self, room: str, at: datetime | None = None) -> Flow[AnomaliesAnswer]:
         return self._get(AnomaliesAnswer, f"/v1/rooms/{_q(room)}/anomalies", at=at)
+
+    # maps
+
+    def maps(self, room: str | None = None, *, limit: int | None = None, cursor: str | None = None) -> Flow[MapPage]:
+        return self._get(MapPage, "/v1/maps", room=room, limit=limit, cursor=cursor)
+
+    def get_map(self, map: str) -> Flow[TownMap]:
+        return self._get(TownMap, f"/v1/maps/{_q(map)}")
+
+    def put_map(self, map: str, fields: MapIn) -> Flow[TownMap]:
+        return self._send(TownMap, "PUT", f"/v1/maps/{_q(map)}", fields)
+
+    def delete_map(self, map: str) -> Flow[None]:
+        return exchange(Call(method="DELETE", path=f"/v1/maps/{_q(map)}"), nothing, self.retry)
+
+    def map_versions(self, map: str, *, limit: int | None = None, cursor: str | None = None) -> Flow[VersionPage]:
+        return self._get(VersionPage, f"/v1/maps/{_q(map)}/versions", limit=limit, cursor=cursor)
+
+    def post_version(self, map: str, version: VersionIn) -> Flow[MapVersion]:
+        return self._send(MapVersion, "POST", f"/v1/maps/{_q(map)}/versions", version)
+
+    def post_tiles(self, map: str, tiles: TileUpload) -> Flow[TilesKept]:
+        return self._send(TilesKept, "POST", f"/v1/maps/{_q(map)}/tiles", tiles)
+
+    def map_tiles(
+        self,
+        map: str,
+        *,
+        since: int = 0,
+        version: int | None = None,
+        data: bool = True,
+        limit: int | None = None,
+        cursor: str | None = None,
+    ) -> Flow[TilePage]:
+        path = f"/v1/maps/{_q(map)}/tiles"
+        return self._get(TilePage, path, since=since, version=version, data=data, limit=limit, cursor=cursor)
+
+    def map_objects(self, map: str, version: int | None = None) -> Flow[MapObjects]:
+        return self._get(MapObjects, f"/v1/maps/{_q(map)}/objects", version=version)
+
+    def map_diff(self, map: str, before: int, after: int | None = None) -> Flow[MapDiff]:
+        return self._get(MapDiff, f"/v1/maps/{_q(map)}/diff", before=before, after=after)
+
+    def map_file(self, map: str, suffix: str, **params: object) -> Flow[bytes]:
+        """``suffix`` is what follows the map's id in the path, such as ``.png``."""
+        given = {name: _param(value) for name, value in params.items() if value is not None}
+        call = Call(method="GET", path=f"/v1/maps/{_q(map)}{suffix}", params=given)
+        return exchange(call, lambda response: response.content, self.retry)
 
     # agents and what they post
 

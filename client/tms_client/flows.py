@@ -106,7 +106,7 @@ def as_model(model: type[M]) -> Callable[[httpx.Response], M]:
         try:
             return model.model_validate_json(response.content, extra="ignore")
         except ValidationError as error:
-            raise BadAnswer(f"{response.request.url}: {_first(error)}") from error
+            raise BadAnswer(f"{response.request.url}: {first_error(error)}") from error
 
     return parse
 
@@ -149,6 +149,7 @@ def _retry_after(headers: httpx.Headers) -> float | None:
         return None
 
 
-def _first(error: ValidationError) -> str:
+def first_error(error: ValidationError) -> str:
+    """Where and what, in one line."""
     one = error.errors(include_url=False)[0]
     return f"{'.'.join(str(part) for part in one['loc'])}: {one['msg']}"

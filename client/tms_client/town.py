@@ -26,6 +26,7 @@ from tms_client.flows import Flow, Retry
 from tms_client.grasping import Onto
 from tms_client.hands import Hand, Hands, Running, only_one, place, plan
 from tms_client.live import Endpoint, LiveFrame, follow, subscription
+from tms_client.maps.blocking import Map, Maps
 from tms_client.posting import Poster
 from tms_client.spool import Spool
 from tms_schemas.agents import AgentView
@@ -72,6 +73,7 @@ class Town:
         self.products = Products(self._connection, self._api)
         self.rooms = Rooms(self._connection, self._api)
         self.agents = Agents(self._connection, self._api)
+        self.maps = Maps(self._connection, self._api)
         self._agents: dict[str, Running] = {}
         self._opening = threading.Lock()
 
@@ -96,6 +98,15 @@ class Town:
             Ambiguous, NotFound: several objects fit equally well, or none; the message names the candidates.
         """
         return self._run(lookup.where(self._api, name, at))
+
+    def map(self, name: str, *, version: int | None = None) -> Map:
+        """A map as numpy arrays, the newest version by default; its ``update()`` fetches only what changed.
+
+        Raises:
+            NotFound: there is no such map or version.
+            TownError: numpy is missing (it comes with the extra ``maps``).
+        """
+        return self.maps.fetch(name, version)
 
     def intake(
         self,

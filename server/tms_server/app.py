@@ -24,6 +24,7 @@ from tms_server.keys.ring import KeyRing
 from tms_server.limits import BodyLimit
 from tms_server.live.endpoints import router as live_router
 from tms_server.live.feed import Feeds
+from tms_server.maps.endpoints import router as maps_router
 from tms_server.objects.endpoints import router as objects_router
 from tms_server.placement import warm_up
 from tms_server.rooms.endpoints import router as rooms_router
@@ -75,7 +76,15 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
     app.add_middleware(BodyLimit, limit=settings.max_body_bytes)
     problems.install(app)
     # Routes are tried in order: the busiest first.
-    for router in (ingest_router, keys_router, objects_router, rooms_router, town_router, agents_router):
+    for router in (
+        ingest_router,
+        keys_router,
+        objects_router,
+        rooms_router,
+        town_router,
+        agents_router,
+        maps_router,
+    ):
         app.include_router(router, prefix="/v1", responses=problems.COMMON_RESPONSES)
     app.include_router(live_router, prefix="/v1")
     app.include_router(health.router)

@@ -16,6 +16,8 @@ import tms_client
 from tms_client import AsyncTown, Retry, Town
 from tms_client import aio as aio_module
 from tms_client import town as town_module
+from tms_client.maps import awaited as awaited_maps
+from tms_client.maps import blocking as blocking_maps
 from tms_schemas.objects import ObjectFields
 from tms_schemas.observation import LabelAppeared, ObservationBatch
 
@@ -213,6 +215,8 @@ def test_both_clients_have_the_same_methods():
         (town_module.Products, aio_module.Products),
         (town_module.Rooms, aio_module.Rooms),
         (town_module.Agents, aio_module.Agents),
+        (blocking_maps.Maps, awaited_maps.AsyncMaps),
+        (blocking_maps.Map, awaited_maps.AsyncMap),
     ):
         methods = {name for name in vars(blocking) if not name.startswith("_")} - {"close"}
         assert methods == {name for name in vars(awaited) if not name.startswith("_")} - {"aclose"}

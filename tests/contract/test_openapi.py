@@ -19,6 +19,8 @@ from schemathesis.specs.openapi.checks import (
 )
 from server_process import ServerProcess
 
+from tms_schemas.tiles import CELLS, Planes, pack, to_text
+
 CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance, response_schema_conformance]
 ROOM = {"name": "contract", "outline": [[0, 0], [6, 0], [6, 5], [0, 5]]}
 
@@ -30,6 +32,10 @@ def test_no_surprises(database_url: str, tmp_path: Path, mode: GenerationMode) -
     with ServerProcess(tmp_path, database_url) as server:
         httpx.put(f"{server.url}/v1/rooms/0", json=ROOM).raise_for_status()
         httpx.put(f"{server.url}/v1/objects/0", json={"name": "tea", "room": "0"}).raise_for_status()
+        httpx.put(f"{server.url}/v1/maps/0", json={"room": "0", "resolution": 0.05}).raise_for_status()
+        tile = {"x": 0, "y": 0, "data": to_text(pack(Planes(bytes(CELLS))))}
+        version = {"base": 0, "agent": "robot", "tiles": [tile]}
+        httpx.post(f"{server.url}/v1/maps/0/versions", json=version).raise_for_status()
         schema = schemathesis.openapi.from_url(server.url + "/openapi.json")
         operations = [found.ok() for found in schema.get_all_operations()]
         assert len(operations) > 20

@@ -154,6 +154,75 @@ class SnapshotRow(Base):
     body: Mapped[bytes]
 
 
+class MapRow(Base):
+    __tablename__ = "maps"
+
+    map: Mapped[str] = mapped_column(primary_key=True)
+    room: Mapped[str] = mapped_column(ForeignKey("rooms.room"), index=True)
+    name: Mapped[str | None]
+    #: Metres per cell; the lower left corner of cell (0, 0) in the map frame.
+    resolution: Mapped[float]
+    origin_x: Mapped[float]
+    origin_y: Mapped[float]
+    map_to_room: Mapped[str | None]
+    #: The newest version, 0 before the first.
+    version: Mapped[int]
+    created_at: Mapped[int]
+    updated_at: Mapped[int]
+
+
+class MapVersionRow(Base):
+    __tablename__ = "map_versions"
+
+    map: Mapped[str] = mapped_column(ForeignKey("maps.map", ondelete="CASCADE"), primary_key=True)
+    version: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    created_at: Mapped[int]
+    agent: Mapped[str]
+    note: Mapped[str]
+    #: SHA-256 of what was asked for, so that the same request again is known.
+    request: Mapped[str]
+    #: x0, y0, x1, y1 in cells as JSON; NULL where nothing is known.
+    bounds: Mapped[str | None]
+    changed: Mapped[int]
+    #: All semi-dynamic objects as JSON; NULL where they are those of the version before.
+    objects: Mapped[str | None]
+
+
+class MapBlobRow(Base):
+    """A tile's content, once per map whatever number of versions and places has it."""
+
+    __tablename__ = "map_blobs"
+
+    map: Mapped[str] = mapped_column(ForeignKey("maps.map", ondelete="CASCADE"), primary_key=True)
+    digest: Mapped[str] = mapped_column(primary_key=True)
+    body: Mapped[bytes]
+    #: Known cells within the tile: columns left to right and rows bottom to top, the upper ends excluded.
+    left: Mapped[int]
+    bottom: Mapped[int]
+    right: Mapped[int]
+    top: Mapped[int]
+    #: When it was last sent; what no version names goes after a while.
+    sent_at: Mapped[int]
+
+
+class MapTileRow(Base):
+    """What the tile at (x, y) holds from version ``since`` on and before version ``until`` (NULL: to this day)."""
+
+    __tablename__ = "map_tiles"
+    __table_args__ = (
+        Index("ix_map_tiles_since", "map", "since"),
+        Index("ix_map_tiles_until", "map", "until"),
+        Index("ix_map_tiles_digest", "map", "digest"),
+    )
+
+    map: Mapped[str] = mapped_column(ForeignKey("maps.map", ondelete="CASCADE"), primary_key=True)
+    x: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    y: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    since: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    until: Mapped[int | None]
+    digest: Mapped[str]
+
+
 class KeyRow(Base):
     __tablename__ = "api_keys"
 

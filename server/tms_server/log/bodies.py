@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter
 
 from tms_schemas.base import Model, Tag
+from tms_schemas.maps import MapId, Version
 from tms_schemas.observation import Observation
 from tms_schemas.rooms import RoomIn
 
@@ -47,7 +48,18 @@ class RoomChanged(Model):
     room: RoomIn
 
 
-RegistryBody = ObjectRegistered | ObjectChanged | ObjectRemoved | RoomChanged
+class MapChanged(Model):
+    """A map of the room was made or changed, or has a new version; ``version`` null: it was deleted.
+
+    No belief depends on it; it is here for those who follow the room.
+    """
+
+    type: Literal["map_changed"] = "map_changed"
+    map: MapId
+    version: Version | None
+
+
+RegistryBody = ObjectRegistered | ObjectChanged | ObjectRemoved | RoomChanged | MapChanged
 registry_body: TypeAdapter[RegistryBody] = TypeAdapter(Annotated[RegistryBody, Field(discriminator="type")])
 
 

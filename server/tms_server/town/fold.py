@@ -11,7 +11,7 @@ import logging
 
 from tms_schemas import events
 from tms_schemas.observation import AgentState, Inventory, Observation, PoseReport, RawRead
-from tms_server.log.bodies import ObjectRemoved, RoomChanged, TrackedObject, Unreadable
+from tms_server.log.bodies import MapChanged, ObjectRemoved, RoomChanged, TrackedObject, Unreadable
 from tms_server.log.record import ORIGIN, Position, Record
 from tms_server.placement import OUT, DrawKey, Engine, InvalidEvent, Parameters
 from tms_server.town import inventory, packing, registry, reports, sight
@@ -42,6 +42,8 @@ class RoomFold:
             match record.content:
                 case Unreadable(kind=kind, why=why):
                     self.note("unreadable", f"{kind}: {why}")
+                case MapChanged():
+                    pass  # told to viewers; the belief is not folded with it
                 case TrackedObject() | ObjectRemoved() | RoomChanged() as change:
                     registry.apply(self, change)
                 case observation:

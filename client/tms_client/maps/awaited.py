@@ -1,0 +1,132 @@
+"""``town.map`` and ``town.maps`` for asyncio: what ``blocking`` has, awaited."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+from tms_client.api import Api
+from tms_client.connection import AsyncConnection
+from tms_client.flows import Flow
+from tms_client.maps.sending import Sender
+from tms_client.maps.view import Held, MapView, catch_up, fetch
+from tms_schemas.maps import Layer, MapDiff, MapIn, MapObject, MapVersion, PgmMode, TownMap
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from tms_client.maps.cells import Intensity
+
+T = TypeVar("T")
+
+
+class AsyncMap(MapView):
+    """A map that can catch up with the server."""
+
+    def __init__(self, held: Held, connection: AsyncConnection, api: Api) -> None:
+        super().__init__(held)
+        self._connection, self._api = connection, api
+
+    async def update(self) -> bool:
+        """Fetch the tiles that changed since; true where there is a newer version. Raises ``NotFound``."""
+        return self._take(await self._connection.run(catch_up(self._api, self._held)))
+
+
+class AsyncMaps:
+    """Maps of all rooms that the key may see."""
+
+    def __init__(self, connection: AsyncConnection, api: Api) -> None:
+        self._connection, self._api = connection, api
+        self._sender = Sender(api)
+
+    async def fetch(self, map: str, version: int | None = None) -> AsyncMap:
+        """The same as ``town.map``."""
+        return AsyncMap(await self._run(fetch(self._api, map, version)), self._connection, self._api)
+
+    async def get(self, map: str) -> TownMap:
+        return await self._run(self._api.get_map(map))
+
+    async def put(self, map: str, fields: MapIn) -> TownMap:
+        return await self._run(self._api.put_map(map, fields))
+
+    async def delete(self, map: str) -> None:
+        """With all its versions."""
+        await self._run(self._api.delete_map(map))
+
+    async def list(self, room: str | None = None) -> AsyncIterator[TownMap]:
+        cursor: str | None = None
+        while True:
+            page = await self._run(self._api.maps(room, cursor=cursor))
+            for one in page.items:
+                yield one
+            if (cursor := page.next_cursor) is None:
+                return
+
+    async def versions(self, map: str) -> AsyncIterator[MapVersion]:
+        """The newest first."""
+        cursor: str | None = None
+        while True:
+            page = await self._run(self._api.map_versions(map, cursor=cursor))
+            for one in page.items:
+                yield one
+            if (cursor := page.next_cursor) is None:
+                return
+
+    async def objects(self, map: str, version: int | None = None) -> Sequence[MapObject]:
+        """The semi-dynamic objects as a version has them, the newest by default."""
+        return (await self._run(self._api.map_objects(map, version))).objects
+
+    async def diff(self, map: str, before: int, after: int | None = None) -> MapDiff:
+        """What changed from one version to another, the newest by default."""
+        return await self._run(self._api.map_diff(map, before, after))
+
+    async def png(self, map: str, version: int | None = None, *, layer: Layer = "occupancy") -> bytes:
+        """A picture."""
+        return await self._run(self._api.map_file(map, ".png", version=version, layer=layer))
+
+    async def diff_png(self, map: str, before: int, after: int | None = None) -> bytes:
+        """A picture: red became occupied, blue became free, yellow became known, violet became unknown."""
+        return await self._run(self._api.map_file(map, "/diff.png", before=before, after=after))
+
+    async def pgm(self, map: str, version: int | None = None, *, mode: PgmMode = "trinary") -> bytes:
+        """The image for ``map_server``; its description is ``yaml``."""
+        return await self._run(self._api.map_file(map, ".pgm", version=version, mode=mode))
+
+    async def yaml(self, map: str, version: int | None = None, *, mode: PgmMode = "trinary") -> str:
+        return (await self._run(self._api.map_file(map, ".yaml", version=version, mode=mode))).decode()
+
+    async def upload(
+        self,
+        map: str,
+        occupancy: npt.ArrayLike,
+        origin: tuple[float, float],
+        *,
+        agent: str,
+        intensity: Intensity | None = None,
+        objects: Sequence[MapObject] | None = None,
+        note: str = "",
+        base: int | None = None,
+        whole: bool = True,
+        snap: bool = False,
+    ) -> MapVersion:
+        """Make a version of arrays; only tiles that differ from those uploaded last travel.
+
+        Args:
+            occupancy: (H, W) probabilities, NaN unknown, row 0 with the lowest y.
+            origin: lower left corner of ``occupancy[0, 0]``, metres in the map frame.
+            objects: all semi-dynamic objects; None leaves those there are.
+            base: the version that this one follows; the one uploaded last by default, at first the newest.
+            whole: False leaves the tiles that the arrays do not touch.
+            snap: shift the arrays to the grid of the map, by up to half a cell.
+
+        Raises:
+            Conflict: somebody else made a version after ``base``. Look at it, then name it as the base.
+            TownError: the arrays are no map, or are off its grid.
+        """
+        sent = await self._run(self._sender.begin(map, base))
+        tiles = await asyncio.to_thread(self._sender.tiles, sent, occupancy, origin, intensity, snap)
+        return await self._run(self._sender.upload(sent, tiles, agent=agent, note=note, objects=objects, whole=whole))
+
+    async def _run(self, flow: Flow[T]) -> T:
+        return await self._connection.run(flow)
