@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor bench-hand faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -14,6 +14,8 @@ help:
 	@echo "make bench-hand     right and wrong grasps of the hand agent (docs/hand.md)"
 	@echo "make bench-cabinet  the smart cabinet on simulated boards (docs/cabinet_position.png)"
 	@echo "make bench-floor    floor sensing on simulated rooms (FLOOR='--quick' for a few minutes)"
+	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
+	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
 	@echo "make faults    the long fault tests (30 kills and more)"
 	@echo "make peers     tests against programs of other people (installs tshark)"
 	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
@@ -46,6 +48,12 @@ bench-cabinet: $(READY)
 
 bench-floor: $(READY)
 	$(BIN)/python benchmarks/floor.py $(FLOOR)
+
+floor-pictures: $(READY)
+	$(BIN)/python benchmarks/floor_pictures.py
+
+bench-slam: $(READY)
+	$(BIN)/python benchmarks/slam.py $(SLAM)
 
 faults: $(READY)
 	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults

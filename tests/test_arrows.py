@@ -15,14 +15,16 @@ ROOT = Path(__file__).resolve().parent.parent
 ALLOWED: dict[str, set[str]] = {
     "tms_schemas": {"pydantic"},
     "tms_client": {"tms_schemas", "pydantic", "httpx", "websockets"},
+    "tms_client/maps": {"tms_schemas", "tms_client", "pydantic", "numpy", "PIL", "yaml"},
+    "tms_client/commands": {"tms_schemas", "tms_client", "pydantic", "numpy"},
     "tms_agents": {
         *("tms_schemas", "tms_client", "pydantic", "pydantic_settings", "httpx"),
-        *("numpy", "numba", "scipy", "serial", "pymodbus", "rosbags"),
+        *("numpy", "numba", "scipy", "PIL", "serial", "pymodbus", "rosbags"),
     },
-    "tms_agents/slam": {"tms_agents/slam", "numpy", "numba", "scipy"},
+    "tms_agents/slam": {"tms_agents/slam", "numpy", "numba", "scipy", "PIL"},
     "tms_server": {
         *("tms_schemas", "tms_migrations", "pydantic", "pydantic_settings", "pydantic_core", "fastapi", "starlette"),
-        *("sqlalchemy", "alembic", "uvicorn", "numpy", "numba", "biip", "epcpy", "fastapi_offline", "asyncpg"),
+        *("sqlalchemy", "alembic", "uvicorn", "numpy", "numba", "PIL", "biip", "epcpy", "fastapi_offline", "asyncpg"),
     },
     "tms_server/commands": {"tms_schemas", "tms_server", "tms_client", "pydantic", "sqlalchemy", "uvicorn"},
     "tms_server/placement": {"tms_schemas", "tms_server/placement", "numpy", "numba", "pydantic"},

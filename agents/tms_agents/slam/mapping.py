@@ -1,0 +1,74 @@
+"""From a log to a trajectory and a map: the stages in their order."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tms_agents.slam.backend import Closed, close_loops
+from tms_agents.slam.filter import ParticleFilter
+from tms_agents.slam.geometry import Floats
+from tms_agents.slam.gridmap import GridMap, grid_map, render
+from tms_agents.slam.keyframes import Indices, key_scans, poses_of_all
+from tms_agents.slam.logs import Log
+from tms_agents.slam.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """After scan ``done`` of ``of`` scans to process; ``real_time`` is time driven over time worked."""
+
+    done: int
+    of: int
+    particles: int
+    effective: float
+    real_time: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """``poses`` (S, 3) of all scans, the first one at the origin; ``keys`` (K,) are those that were processed,
+    ``filtered`` (K, 3) is the path of the filter's best particle there, before loops were closed.
+
+    ``filter_seconds`` and ``backend_seconds`` are CPU time of this process.
+    """
+
+    poses: Floats
+    keys: Indices
+    filtered: Floats
+    grid: GridMap
+    closed: Closed
+    resamplings: int
+    filter_seconds: float
+    backend_seconds: float
+
+
+def build_map(log: Log, settings: Settings, progress: Callable[[Progress], None] = lambda _: None) -> Result:
+    """The filter over all key scans, then loop closing over the best path, then the map of the final path."""
+    keys = key_scans(log, settings.step_m, settings.step_rad)
+    scans = [log.points(int(n)) for n in keys]
+    began, began_cpu = time.perf_counter(), time.process_time()
+    particles = ParticleFilter(settings, log.laser)
+    for k, n in enumerate(keys):
+        particles.process(log.odometry[n], log.driven[n], scans[k])
+        spent = max(1e-9, time.perf_counter() - began)
+        real_time = float(log.t[n] - log.t[0]) / spent
+        progress(Progress(k + 1, len(keys), len(particles.poses), particles.effective, real_time))
+    filtered_cpu = time.process_time()
+    path, resamplings = particles.path(), particles.resamplings
+    del particles  # its maps are as large as what follows
+    closed = close_loops(path, log.odometry[keys], log.driven[keys], scans, log.laser[:2], settings)
+    maps = render(closed.path, scans, log.laser[:2], settings.resolution, settings.reach_m)
+    poses = poses_of_all(log, keys, closed.path)
+    done_cpu = time.process_time()
+    return Result(
+        poses,
+        keys,
+        path,
+        grid_map(maps, 0),
+        closed,
+        resamplings,
+        filtered_cpu - began_cpu,
+        done_cpu - filtered_cpu,
+    )

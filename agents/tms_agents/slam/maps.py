@@ -1,0 +1,79 @@
+"""Occupancy maps and their distance fields, one of each per particle (or per submap), in one growing rectangle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tms_agents.slam.distance import LARGEST_RADIUS, disc, mark_discs, update_distances
+from tms_agents.slam.geometry import Bytes, Floats, Ints
+from tms_agents.slam.occupancy import UNKNOWN, mark_rays, write_rays
+from tms_agents.slam.tiles import SIDE, TiledMaps
+
+#: Change so many cells per beam at most become free in one scan; the others wait for the next one.
+_CHANGES_PER_BEAM = 8
+_MARGIN_TILES = 4
+
+
+class Maps:
+    """N maps of ``resolution`` m; ``reach`` m is how far their distance fields reach (rounded to cells, 15 at most)."""
+
+    def __init__(self, maps: int, resolution: float, reach: float) -> None:
+        self.resolution = resolution
+        self.radius = int(np.clip(round(reach / resolution), 2, LARGEST_RADIUS))
+        self.occupancy = TiledMaps(maps, UNKNOWN, 8, 8)
+        self.distance = TiledMaps(maps, self.radius**2, 8, 8)
+        #: x, y (m) of the lower left corner, cells per m.
+        self.frame: Floats = np.array([-4 * SIDE * resolution, -4 * SIDE * resolution, 1.0 / resolution])
+        #: Distance in m of each squared distance in cells.
+        self.metres: Floats = np.minimum(np.sqrt(np.arange(256.0)), self.radius) * resolution
+        self._offsets = disc(self.radius)
+
+    def integrate(self, poses: Floats, points: Floats, laser: Floats) -> None:
+        """Write one scan into every map: ``points`` (M, 2) where beams from ``laser`` (2,) ended, seen from ``poses``
+        (N, 3)."""
+        reach = float(np.hypot(points[:, 0], points[:, 1]).max(initial=0.0)) + float(np.hypot(*laser))
+        self._include(poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
+        n, height, width = self.occupancy.directory.shape
+        across = 2 * int(reach / (SIDE * self.resolution)) + 5
+        seen: Bytes = np.zeros((n, height * width), dtype=np.uint8)
+        wanted: Ints = np.empty((n, min(height * width, across * across)), dtype=np.int32)
+        counts: Ints = np.empty(n, dtype=np.int32)
+        mark_rays(width, poses, points, laser, self.frame, seen, wanted, counts)
+        self.occupancy.make_writable(wanted, counts)
+        changed: Ints = np.empty((n, _CHANGES_PER_BEAM * max(1, len(points))), dtype=np.int32)
+        changes: Ints = np.empty(n, dtype=np.int32)
+        lengths = np.hypot(points[:, 0] - laser[0], points[:, 1] - laser[1])
+        capacity = int((lengths * self.frame[2] + 4).sum())
+        occupancy, distance = self.occupancy, self.distance
+        write_rays(occupancy.directory, occupancy.cells, poses, points, laser, self.frame, capacity, changed, changes)
+        mark_discs(height, width, self.radius, changed, changes, seen, wanted, counts)
+        distance.make_writable(wanted, counts)
+        update_distances(
+            distance.directory,
+            distance.cells,
+            occupancy.directory,
+            occupancy.cells,
+            self._offsets,
+            changed,
+            changes,
+        )
+
+    def resample(self, parents: Ints) -> None:
+        """Map n becomes what map ``parents[n]`` was."""
+        self.occupancy.resample(parents)
+        self.distance.resample(parents)
+
+    def _include(self, lowest: Floats, highest: Floats) -> None:
+        """The rectangle grows, with a margin, until both corners (m) and the reach of their fields are inside."""
+        span = SIDE * self.resolution
+        edge = (self.radius + 1) * self.resolution
+        height, width = self.occupancy.directory.shape[1:]
+        below = np.ceil((self.frame[:2] - (lowest - edge)) / span).astype(int)
+        above = np.ceil((highest + edge - self.frame[:2]) / span).astype(int) - np.array([width, height])
+        if (below <= 0).all() and (above <= 0).all():
+            return
+        left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
+        right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
+        self.occupancy.extend(bottom, left, top, right)
+        self.distance.extend(bottom, left, top, right)
+        self.frame = self.frame - np.array([left * span, bottom * span, 0.0])

@@ -1,0 +1,199 @@
+"""Laser mapping on public logs and on simulated buildings with long loops: accuracy over seeds, CPU time, memory.
+
+    python benchmarks/slam.py                          all tables (an hour on one core)
+    python benchmarks/slam.py --only logs --seeds 3    logs, particles, buildings or threads
+    python benchmarks/slam.py --only logs --logs intel
+
+The public logs are read from the shared data folder (`TMS_SHARED_DATA`); docs/slam.md says where they come from. Every
+run is a process of its own with one thread: CPU time is that of one core, memory is the peak above what a process needs
+that has imported everything and loaded what was compiled before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import multiprocessing
+import os
+import resource
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+
+from tms_agents.simulation.building import PLANS, Drive, carmen, drive
+from tms_agents.slam import Log, Settings, build_map, read_log
+from tms_agents.slam.filter import ParticleFilter
+from tms_agents.slam.geometry import Floats, between
+from tms_agents.slam.keyframes import key_scans, poses_of_all
+from tms_agents.slam.logs_carmen import parse_carmen
+from tms_agents.slam.metric import agreement_with, read_relations
+
+DATA = Path(os.environ.get("TMS_SHARED_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")) / "slam"
+#: Name of the log -> its relations, and what they are.
+LOGS = {
+    "intel": ("intel.relations.gz", "truth"),
+    "fr079-signfix": ("fr079.logtime.relations.gz", "truth"),
+    "mit-csail": ("mit-csail.pseudo.relations.gz", "published run"),
+}
+PARTICLES = (1, 10, 30, 50, 100, 512)
+#: Odometry as good as that of the MIT Killian Court log, and much worse.
+WHEELS = {"good": Drive(turn_per_m=0.01, pull_per_m=0.0003), "poor": Drive()}
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """``world`` is a log, or "plan wheels"."""
+
+    world: str
+    seed: int
+    particles: int = 30
+    threads: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Errors (m, degrees) of the filter alone and after loop closing; times per processed scan (ms), memory (MB)."""
+
+    job: Job
+    scans: int
+    filtered: float
+    closed: float
+    rotation: float
+    worst: float
+    filter_ms: float
+    all_ms: float
+    wall_s: float
+    span_s: float
+    above_mb: float
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", choices=("logs", "particles", "buildings", "threads"))
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--logs", default=",".join(LOGS), help="comma separated")
+    parser.add_argument("--jobs", type=int, default=1, help="processes side by side")
+    args = parser.parse_args(arguments)
+    if unknown := set(args.logs.split(",")) - set(LOGS):
+        parser.error(f"no log {', '.join(unknown)}; there are {', '.join(LOGS)}")
+    here = [name for name in args.logs.split(",") if (DATA / f"{name}.log.gz").exists()]
+    if not here:
+        print(f"No shared logs at {DATA} (TMS_SHARED_DATA)\n")
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(args.jobs, mp_context=spawn, max_tasks_per_child=1) as pool:
+        pool.submit(run, Job("block good", 0)).result()  # compiles what is not compiled yet
+        if args.only in (None, "logs"):
+            over_seeds(pool, here, args.seeds)
+        if args.only in (None, "particles") and "intel" in here:
+            print("## Particles (Intel, seed 0)\n\n" + HEADER)
+            for outcome in pool.map(run, [Job("intel", 0, particles) for particles in PARTICLES]):
+                print(_row(f"intel, {outcome.job.particles}", [outcome]), flush=True)
+            print()
+        if args.only in (None, "threads") and "intel" in here:
+            print("## Threads (Intel, 30 particles)\n\n| threads | wall s | CPU ms per scan |\n|---|---|---|")
+            for threads in (1, 2):
+                one = pool.submit(run, Job("intel", 0, threads=threads)).result()
+                print(f"| {threads} | {one.wall_s:.1f} | {one.all_ms:.1f} |", flush=True)
+            print()
+        if args.only in (None, "buildings"):
+            over_seeds(pool, [f"{plan} {wheels}" for plan in PLANS for wheels in WHEELS], args.seeds)
+
+
+HEADER = (
+    "| log | error m, mean (worst seed) | filter alone | rotation deg | largest error m | scans | filter ms/scan "
+    "| all ms/scan | x real time | MB above imports |\n|---|---|---|---|---|---|---|---|---|---|"
+)
+
+
+def over_seeds(pool: ProcessPoolExecutor, worlds: Iterable[str], seeds: int) -> None:
+    """A line per world."""
+    print(f"## 30 particles, {seeds} seeds\n\n{HEADER}")
+    for world in worlds:
+        print(_row(world, list(pool.map(run, [Job(world, seed) for seed in range(seeds)]))), flush=True)
+    print()
+
+
+def _row(name: str, found: list[Outcome]) -> str:
+    closed, filtered = np.array([o.closed for o in found]), np.array([o.filtered for o in found])
+    return (
+        f"| {name} | {closed.mean():.4f} ({closed.max():.4f}) | {filtered.mean():.4f} ({filtered.max():.4f}) "
+        f"| {np.mean([o.rotation for o in found]):.2f} | {max(o.worst for o in found):.2f} | {found[0].scans} "
+        f"| {np.mean([o.filter_ms for o in found]):.1f} | {np.mean([o.all_ms for o in found]):.1f} "
+        f"| {np.mean([o.span_s / o.wall_s for o in found]):.0f} | {max(o.above_mb for o in found):.0f} |"
+    )
+
+
+def run(job: Job) -> Outcome:
+    """One run in this process."""
+    numba.set_num_threads(min(job.threads, numba.get_num_threads()))
+    log, relations, odometry = _world(job.world, job.seed)
+    settings = Settings(particles=job.particles, seed=job.seed)
+    _warm(log)
+    before = _peak_mb()
+    began = time.perf_counter()
+    result = build_map(log, settings)
+    wall = time.perf_counter() - began
+    peak = _peak_mb()
+    filtered = poses_of_all(log, result.keys, result.filtered)
+    errors = [
+        agreement_with(relations, np.column_stack([log.t, poses]), odometry) for poses in (filtered, result.poses)
+    ]
+    scans = len(result.keys)
+    return Outcome(
+        job,
+        scans,
+        errors[0].translation,
+        errors[1].translation,
+        errors[1].rotation,
+        errors[1].translation_worst,
+        1000 * result.filter_seconds / scans,
+        1000 * (result.filter_seconds + result.backend_seconds) / scans,
+        wall,
+        float(log.t[-1] - log.t[0]),
+        peak - before,
+    )
+
+
+def _warm(log: Log) -> None:
+    """Loads the compiled kernels: two scans, two particles."""
+    particles = ParticleFilter(Settings(particles=2), log.laser)
+    for n in key_scans(log, 0.5, 0.25)[:2]:
+        particles.process(log.odometry[n], log.driven[n], log.points(int(n)))
+
+
+def _world(name: str, seed: int) -> tuple[Log, Floats, Floats | None]:
+    """(log, relations, odometry of all records)."""
+    if name in LOGS:
+        with gzip.open(DATA / f"{name}.odom.txt.gz", "rt") as file:
+            odometry = np.loadtxt(file, usecols=(0, 1, 2, 3))
+        return read_log(DATA / f"{name}.log.gz"), read_relations(DATA / LOGS[name][0]), odometry
+    plan, wheels = name.split()
+    how = WHEELS[wheels]
+    driven = drive(plan, Drive(seed=seed, turn_per_m=how.turn_per_m, pull_per_m=how.pull_per_m))
+    return parse_carmen(carmen(driven)), _relations(driven.t, driven.truth), None
+
+
+def _relations(t: Floats, truth: Floats) -> Floats:
+    """Between scans that follow each other, and between visits of the same place (within 3 m, 40 scans apart)."""
+    first, second = list(range(len(truth) - 1)), list(range(1, len(truth)))
+    for n in range(0, len(truth), 2):
+        apart = np.hypot(*(truth[:, :2] - truth[n, :2]).T)
+        apart[: n + 40] = np.inf
+        other = int(np.argmin(apart))
+        if apart[other] < 3.0:
+            first.append(n)
+            second.append(other)
+    return np.column_stack([t[first], t[second], between(truth[first], truth[second])])
+
+
+def _peak_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+if __name__ == "__main__":
+    main()
