@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import os
 import re
 import subprocess
@@ -15,7 +14,6 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text()
 ADDRESS = "http://127.0.0.1:8080"
-CHECKER = doctest.OutputChecker()
 
 COMMANDS = [
     (command, output)
@@ -29,16 +27,20 @@ PROGRAMS = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", README, re.DOTALL
 def demo() -> Iterator[str]:
     """The demo after its story; its address."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tms_client", "demo", "--speed", "5", "--port", "0"], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "tms_client", "demo", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     )
     assert process.stdout is not None
-    url = ""
+    told = ""
     for line in process.stdout:
-        url = url or "".join(re.findall(r"The page: (http://\S+?)/$", line))
+        told += line
         if line.startswith("The room lives on"):
             break
     try:
-        yield url
+        assert "The room lives on" in told, told
+        yield "".join(re.findall(r"The page: (http://\S+?)/$", told, re.MULTILINE))
     finally:
         process.terminate()
         process.wait(30)
@@ -52,27 +54,37 @@ def run(arguments: list[str], url: str) -> str:
         env=os.environ | {"TMS_URL": url, "PATH": path},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-SHARE = re.compile(r"(\d+\.\d)%")
+SHARE = re.compile(r"(\d+(?:\.\d)?) ?%")
 
 
 def assert_like(expected: str, got: str) -> None:
-    """The same words; shares within a point of each other, and those under half a point may come and go: processes
-    of their own made them, and no two runs of those are the same to the last digit."""
-    told, shares = [], []
-    for text in (expected, got):
-        lines = [line for line in text.splitlines() if not (found := SHARE.search(line)) or float(found[1]) >= 0.5]
-        told.append(SHARE.sub("%", "\n".join(lines)) + "\n")
-        shares.append([float(one) for one in SHARE.findall("\n".join(lines))])
-    same = CHECKER.check_output(told[0], told[1], doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
-    assert same, f"the README says\n{expected}\nbut it is\n{got}"
-    assert shares[1] == pytest.approx(shares[0], abs=1.0), got
+    """The same words, where ``...`` stands for any; shares within three points of each other, and those under two may
+    come and go: processes of their own made them out of noisy scans, and no two runs of those are the same."""
+    expected, got = (" ".join(line for line in text.splitlines() if _counts(line)) for text in (expected, got))
+    told = SHARE.split(" ".join(expected.split()))
+    pattern = f"{SHARE.pattern}".join(re.escape(words).replace(r"\.\.\.", ".*?") for words in told[::2])
+    found = re.fullmatch(pattern, " ".join(got.split()))
+    assert found, f"the README says\n{expected}\nbut it is\n{got}"
+    assert [float(one) for one in found.groups()] == pytest.approx([float(one) for one in told[1::2]], abs=3.0), got
+
+
+def _counts(line: str) -> bool:
+    share = SHARE.search(line)
+    return share is None or float(share[1]) >= 2.0
+
+
+def test_words_and_shares_are_compared() -> None:
+    assert_like("a ... tea 95.6%\nmug 4%\n", "a\n  b c tea 97.4%\nmug 2 %\nno 1.4%\n")
+    for other in ("a b coffee 95.6% mug 4%", "a b tea 91.9% mug 4%", "a b tea 95.6%"):
+        with pytest.raises(AssertionError):
+            assert_like("a ... tea 95.6% mug 4%", other)
 
 
 def test_the_readme_has_snippets() -> None:
@@ -80,13 +92,13 @@ def test_the_readme_has_snippets() -> None:
     assert len(PROGRAMS) == 1
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("command", "output"), COMMANDS, ids=[command for command, _ in COMMANDS])
 def test_commands(demo: str, command: str, output: str) -> None:
     assert_like(output, run(["sh", "-c", command], demo))
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("program", "output"), PROGRAMS, ids=["where"])
 def test_programs(demo: str, program: str, output: str) -> None:
     assert ADDRESS in program

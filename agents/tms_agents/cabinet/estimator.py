@@ -35,8 +35,9 @@ _BALANCE_S, _CORRECT_S, _BALANCE_SURE = 1.0, 4.0, 0.9
 _VERDICT_S = 1.5
 #: What may be a part of several things that are being put must stay so for so long to be believed.
 _PART_S = 3.0
-#: A load that only seems to put an error right may be a light thing on its way: it must stay so for so long.
-_SETTLED_S = 2.5
+#: A load that only seems to put an error right may be a light thing on its way: unless that is so sure, it must stay so
+#: for so long.
+_SETTLED_SURE, _SETTLED_S = 0.98, 2.5
 #: How often a lifted thing's tag is still in view after ``IN_HAND_S``: while it is carried over the board.
 _CARRIED = 0.1
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
@@ -215,7 +216,8 @@ class CabinetEstimator:
             explanations = [item for item in explanations if item.kind != "press"]
         best, *others = explanations
         if best.kind == "settled":
-            if steady < _SETTLED_S and abs(step.weight_g) > self._settings.min_weight_g:
+            doubtful = best.score < _SETTLED_SURE and abs(step.weight_g) > self._settings.min_weight_g
+            if doubtful and steady < _SETTLED_S:
                 self._detector.ignore(step) if final else self._detector.hold(step)
                 return []
             self._detector.accept(step)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from argparse import BooleanOptionalAction
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
@@ -31,8 +32,9 @@ def main(argv: Sequence[str]) -> int:
     )
     parser.add_argument(
         "--laser",
-        action="store_true",
-        help="an emulated laser and its agent see the floor (at speed 1), instead of a floor sensor without device",
+        action=BooleanOptionalAction,
+        help="an emulated laser and its agent see the floor, or a floor sensor without device does "
+        "(default: the laser, where people walk as people do: --speed 0.5 to 1.25)",
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the sensors' noise (default 0)")
     parser.add_argument("--url", help="use this running server instead of starting one")

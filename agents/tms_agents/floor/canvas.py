@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
+import io
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 Xy = tuple[float, float]
 #: Digits and a few letters, five rows of three dots, as numbers in octal.
 _GLYPHS = {
     "0": 0o75557, "1": 0o26227, "2": 0o71747, "3": 0o71717, "4": 0o55711, "5": 0o74717, "6": 0o74757, "7": 0o71244,
-    "8": 0o75757, "9": 0o75717, ".": 0o00002, "m": 0o05755, " ": 0o00000, "-": 0o00700,
+    "8": 0o75757, "9": 0o75717, ".": 0o00002, "m": 0o00775, " ": 0o00000, "-": 0o00700,
 }  # fmt: skip
 #: Bits of a braille character by row and column of its dots.
 _BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.int64)
@@ -76,16 +76,11 @@ class Canvas:
 
     def png(self, palette: Sequence[tuple[int, int, int]]) -> bytes:
         """A file; ``palette`` gives the colours, that of the ground first."""
-        height, width = self.dots.shape
-        rows = np.zeros((height, width + 1), np.uint8)
-        rows[:, 1:] = self.dots
-        header = struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)
-        colours = bytes(value for colour in palette for value in colour)
-        chunks = ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
-        return b"\x89PNG\r\n\x1a\n" + b"".join(
-            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-            for kind, data in chunks
-        )
+        image = Image.fromarray(self.dots)
+        image.putpalette([value for colour in palette for value in colour])
+        file = io.BytesIO()
+        image.save(file, "PNG", optimize=True)
+        return file.getvalue()
 
     def braille(self) -> list[list[tuple[str, int]]]:
         """Rows of characters with the number of their colour: of several colours in a character the highest."""

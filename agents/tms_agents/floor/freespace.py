@@ -20,6 +20,8 @@ UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT = 0, 1, 2, 3, 4, 5
 QUIET = 0.9
 #: Where nothing echoes behind it, a thing is missing when nothing echoes any more, if it did so reliably.
 _RELIABLE = 0.93
+#: Where the background is silent less often than this, silence shows that something black or glossy is there.
+_MUTE = 0.3
 
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range); no object is wider than this (m).
 _SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
@@ -133,7 +135,7 @@ def look(
             low = max(0, int(np.ceil(middle - half_angle - 1.0)))
             high = min(n - 1, int(np.floor(middle + half_angle + 1.0)))
             inner = max(0.5, 0.75 * half_angle)
-            hits, beyond, hidden, total, alien = 0, 0, 0, 0, 0
+            hits, beyond, hidden, total, alien, mute = 0, 0, 0, 0, 0, 0
             x, y = 0.0, 0.0
             a, b = -1, -1
             o = 4 if v > 0 else 0
@@ -162,6 +164,8 @@ def look(
                     beyond += 1
                 elif states[i] != NO_ECHO and r < away - gate:
                     hidden += 1
+                elif states[i] == NO_ECHO and empty[i] < _MUTE and thing.rate < QUIET:
+                    mute += 1
             if total == 0:
                 continue
             if hits > 0:
@@ -205,13 +209,13 @@ def look(
                 continue
             if out.verdict == HIT:
                 continue
-            if 2 * beyond >= total and (hidden == 0 or beyond >= 2):
+            if 2 * beyond >= total and (hidden == 0 or beyond >= 2) and 3 * mute < total:
                 # By way of a mirror places are less exact: what hides a thing directly says more.
                 if v == 0 or out.verdict == UNSEEN:
                     out.verdict = FREE
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
-            elif out.verdict == UNSEEN and beyond == 0:
+            elif out.verdict == UNSEEN and (beyond == 0 or mute > 0):
                 out.verdict = SILENT
 
 
@@ -219,7 +223,7 @@ def look(
 def silent(
     x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
 ) -> bool:
-    """Whether most beams to (x, y) ± half m echo nothing, though the background there does: black or glossy."""
+    """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy."""
     away = np.hypot(x - pose[0], y - pose[1])
     middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, ranges.size)
     if np.isnan(middle):
@@ -230,7 +234,7 @@ def silent(
     for i in range(low, high + 1):
         if np.isinf(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
             count += 1
-    return bool(count > 0 and 3 * count >= 2 * (high - low + 1))
+    return bool(count > 0 and 2 * count >= high - low + 1)
 
 
 @njit(cache=True)

@@ -23,6 +23,8 @@ _TOGETHER_S = 2.0
 _SAME_M = 0.05
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
 _GONE_S, _WEIGHT = 0.8, 0.12
+#: It cannot stand at its new place so long (s) before it is seen to have gone, unless who pushes it hides that.
+_EARLY_S = 2.0
 
 
 @dataclass(slots=True)
@@ -120,7 +122,7 @@ class Furniture:
             return True
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
-        near = [p for p in near if print_["first"] - p.t + _GONE_S > -5.0]
+        near = [p for p in near if print_["first"] - p.t + _GONE_S > -_EARLY_S]
         best, best_cost = None, 1.0
         width, spacing = float(print_["width"]), float(print_["spacing"])
         for piece in near:

@@ -31,6 +31,8 @@ _TRUST_M = 0.04
 _SPARE_S = 2.0
 #: One beam is believed after so many hits; what has never been seen whole after so long (s).
 _SINGLE, _PART_S = 10, 4.0
+#: What is black or glossy is believed where so many scans saw nothing behind it; of all more than this share hit it.
+_MUTES, _SELDOM = 10, 0.06
 #: Somebody lost sight of so near (m) may still stand there for so long (s), on two feet so near each other (m) that are
 #: seen again at the same time (within s).
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
@@ -76,6 +78,7 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
             # Black and glossy things do not always echo, but nothing is seen through them.
             thing.rate -= 0.02 * thing.rate
             thing.solid += 0.02 * (1.0 - thing.solid)
+            thing.doubt = max(0.0, thing.doubt - _PER_SCAN)
         elif seen.verdict == FREE:
             # Since the last look by any sensor, but no longer than a scan takes: between them it was hidden.
             thing.free += min(dt, t - thing.free_at, 0.2)
@@ -127,10 +130,11 @@ def _plain(q: Any, t: float, rest_s: float) -> bool:
     age = t - q.first
     # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
     # What is silent most of the time shows less of itself.
-    quiet = t - q.silent < 1.0 and q.hits >= 6
+    seldom = t - q.silent < 1.0 and q.mutes >= _MUTES and q.hits > _SELDOM * (q.looks + q.mutes)
+    quiet = seldom or (t - q.silent < 1.0 and q.hits >= 6)
     if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet:
         return False
-    if q.beams < 1.5 and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks or q.hits < _SINGLE):
+    if q.beams < 1.5 and not seldom and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks or q.hits < _SINGLE):
         return False
     # What has never been seen whole may be a part of anything: of a robot, of somebody's feet.
     return bool(q.whole > 0 or quiet or age > (0.5 if q.given else 1.0) * _PART_S)
@@ -240,7 +244,9 @@ class Objects:
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
         thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["first"], t, 0.0, 0.0, t
-        thing["rate"] = thing["solid"] = min(0.99, max(0.5, print_["hits"] / max(int(print_["looks"]), 1)))
+        hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
+        thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
+        thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))
         since, width = float(thing["since"]), float(print_["width"])
         return [Appeared(t, label, "object", _xy(thing), _cov(thing), False, since, who, width)]
 

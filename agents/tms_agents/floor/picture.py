@@ -93,7 +93,8 @@ def tracks_png(
 ) -> bytes:
     """The whole of a recording in one picture: (number, mover or object, places) of every label, over its walls."""
     everything = {**view, "labels": [*view["labels"], *({"xy": place} for _, _, places in tracks for place in places)]}
-    frame = frame_of([everything])
+    x0, y0, x1, y1 = frame_of([everything])
+    frame = (x0, y0 - 0.06 * (x1 - x0), x1, y1)  # with a place for the scale
     height = round(width * (frame[3] - frame[1]) / (frame[2] - frame[0]))
     canvas = Canvas(width, max(50, min(height, 4 * width)), frame)
     draw({**view, "labels": []}, canvas, dot=2)
@@ -109,5 +110,14 @@ def tracks_png(
                 canvas.line([(x + shift / canvas.scale, y) for x, y in places], colour)
             canvas.ring(places[0], _THING_M, colour)
         canvas.text((places[-1][0] + 0.05, places[-1][1] + 0.05), str(number), colour, 3)
+    _scale(canvas, frame)
     palette += _TRAILS
     return canvas.png(palette)
+
+
+def _scale(canvas: Canvas, frame: tuple[float, float, float, float]) -> None:
+    """A metre, in the lower left corner."""
+    x, y = frame[0] + 5 / canvas.scale, frame[1] + 5 / canvas.scale
+    tick = 5 / canvas.scale
+    canvas.line([(x, y + tick), (x, y), (x + 1.0, y), (x + 1.0, y + tick)], WALL)
+    canvas.text((x + tick, y + tick), "1 m", WALL, 2)

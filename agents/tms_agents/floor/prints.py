@@ -14,6 +14,10 @@ Array = NDArray[np.float64]
 
 #: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
 _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
+#: So many times more often seen than seen whole.
+_HARDLY = 8
+#: What is black or glossy echoes now and then: at least once in this time (s).
+_MUTE_S = 3.0
 #: The mean place of what does not move stays within this (m, and per metre of range).
 _STILL_M, _STILL = 0.008, 0.001
 #: Somebody is at a print when the body or a foot is so near (m).
@@ -76,7 +80,7 @@ def follow(
             of[k] = j
             taken[j] = True
             q = prints[j]
-            q.used, q.first, q.hits, q.looks, q.whole = 1, t, 0, 0, 0
+            q.used, q.first, q.hits, q.looks, q.mutes, q.whole = 1, t, 0, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
@@ -85,21 +89,23 @@ def follow(
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
-            q.first, q.hits, q.looks, q.whole, q.spread = t, 0, 0, 0, 0.0
+            q.first, q.hits, q.looks, q.mutes, q.whole, q.spread = t, 0, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
             q.revealed = 0
         if t - max(q.last, q.silent) > _GONE_S:
             # Somebody else may stand there now.
-            q.first, q.hits, q.looks, q.whole, q.spread = t, 0, 0, 0, 0.0
+            q.first, q.hits, q.looks, q.mutes, q.whole, q.spread = t, 0, 0, 0, 0, 0.0
         q.hits += 1
         q.looks += 1
         q.last = t
         q.attached += 0.15 * (c.attached - q.attached)
         q.sensor, q.first_beam, q.last_beam = sensor, c.first, c.last
-        if not c.cut or q.whole == 0:
+        # What is black or glossy is hardly ever seen whole: all that is seen of it counts.
+        hardly = c.cut and (q.whole == 0 or (q.mutes > q.hits > _HARDLY * q.whole))
+        if not c.cut or hardly:
             if not c.cut:
                 q.whole += 1
-            gain = max(0.05, 1.0 / max(q.whole, 1))
+            gain = 0.05 if hardly and q.whole > 0 else max(0.05, 1.0 / max(q.whole, 1))
             q.x += gain * (c.x - q.x)
             q.y += gain * (c.y - q.y)
             q.width += gain * (c.width - q.width)
@@ -115,13 +121,17 @@ def follow(
             continue
         if t - q.last > _HIDDEN_S:
             q.used = 0
+        elif silent(q.x, q.y, 0.5 * q.width, ranges, longest, pose, first, step):
+            q.silent = t
+            if sensor == q.sensor:
+                q.mutes += 1
+            if t - q.last > _MUTE_S:
+                q.used = 0
         elif clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step) == FREE:
             if sensor == q.sensor:
                 q.looks += 1
-            if t - q.last > _GONE_S:
+            if t - max(q.last, q.silent) > _GONE_S:
                 q.used = 0
-        elif silent(q.x, q.y, 0.5 * q.width, ranges, longest, pose, first, step):
-            q.silent = t
 
 
 @njit(cache=True)

@@ -23,7 +23,7 @@ from tms_agents.floor.core import Floor
 from tms_agents.floor.live_view import LiveView
 from tms_agents.floor.recorder import Recorder
 from tms_agents.floor.settings import Pose
-from tms_agents.floor.warm import warm_up
+from tms_agents.floor.warm import compiled_before, warm_up
 from tms_agents.live import serve_view, socket_path
 from tms_agents.outbox import Outbox, mendable
 from tms_agents.running import Posted, Running, running
@@ -106,6 +106,8 @@ class Understanding:
         """Have the estimator compiled; once is enough."""
         async with self._warming:
             if not self._warm:
+                if not compiled_before():
+                    log.info("compiling the estimator, which happens at the first start only (up to a minute) ...")
                 await self.call(warm_up)
                 self._warm = True
 

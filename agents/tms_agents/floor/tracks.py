@@ -38,12 +38,14 @@ _PUSHED_M = 2.0
 _ALONE = 0.3
 #: Nobody stands with the feet so far apart (m) for long.
 _ASTRIDE_M = 0.48
+#: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
+_SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
 #: Two of them so near each other (m) are one.
 _UNITE_M = 0.45
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
-#: A seated person's feet vanish so near the seat (m).
-_SEAT_M = 0.45
+#: A seated person's feet vanish so near the seat (m), and those of somebody who goes where nobody is looked for.
+_SEAT_M, _MASK_M = 0.45, 0.3
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
 
@@ -54,10 +56,10 @@ def _is_lone(body: Any, t: float) -> bool:
     if body.robot or body.wide > 0.6 or body.width > 0.2:
         return False
     a, b = t - body.a_seen, t - body.b_seen
-    if body.still > _STILL_S:
-        return True
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)
-    if max(a, b) < 0.5 and apart > _ASTRIDE_M and t - max(body.a_since, body.b_since) > 1.5:
+    sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
+    astride = max(a, b) < 0.5 and apart > _ASTRIDE_M and t - max(body.a_since, body.b_since) > 1.5
+    if body.still > _STILL_S or sliver or astride:
         return True
     since = body.a_since if a < b else body.b_since
     return bool(max(a, b) > 1.0 and t - since > 1.0)
@@ -178,7 +180,7 @@ class Tracks:
         self._association = association
         self.bodies = association.bodies
         self._settings = settings
-        self._seats, self._gates = Area(scene.seats), Area(scene.gates)
+        self._seats, self._masks, self._gates = Area(scene.seats), Area(scene.masks), Area(scene.gates)
         self._region = Area([] if scene.region is None else [scene.region])
         self._robots = [tuple(sorted(size)) for size in scene.robots]
         self.absent = Absent(self._gates)
@@ -263,7 +265,9 @@ class Tracks:
 
     def _gone(self, index: int, t: float) -> list[FloorEvent]:
         body = self.bodies[index]
-        if self._seated(body) and t - body["seen"] < 86400.0:
+        if t - body["seen"] < (
+            86400.0 if self._seated(body) else self._settings.hidden_s if self._masked(body) else 0.0
+        ):
             body["clear"] = 0.0
             return self._lost(index, t)
         self._association.forget(index)
@@ -306,6 +310,9 @@ class Tracks:
     def _seated(self, body: Any) -> bool:
         return self._seats.distance(body["ax"], body["ay"]) < _SEAT_M
 
+    def _masked(self, body: Any) -> bool:
+        return self._masks.distance(body["x"], body["y"]) < _MASK_M
+
     def _outside(self, body: Any) -> bool:
         x, y = float(body["x"]), float(body["y"])
         if self._gates.polygons:
@@ -313,11 +320,7 @@ class Tracks:
         return bool(self._region.polygons) and self._region.distance(x, y) > 0.0
 
     def _confirm(
-        self,
-        index: int,
-        t: float,
-        new_label: Callable[[], int],
-        was_furniture: Callable[[Any], bool],
+        self, index: int, t: float, new_label: Callable[[], int], was_furniture: Callable[[Any], bool]
     ) -> list[FloorEvent]:
         body = self.bodies[index]
         if body["from_furniture"] == 1 and body["wide"] > 0.3:
@@ -376,9 +379,9 @@ class Tracks:
             since = max(0.0, float(body["first"]) - seen)
             gap = math.hypot(body["x0"] - x, body["y0"] - y)
             reach = _OUT_M + min(_SPEED * since, 1.2)
-            if self._seated(other):
-                gap = min(gap, self._seats.distance(body["x0"], body["y0"]) + 0.05)
-                reach = 0.7
+            for out_of_view, area in ((self._seated, self._seats), (self._masked, self._masks)):
+                if out_of_view(other):
+                    gap, reach = min(gap, area.distance(body["x0"], body["y0"]) + 0.05), 0.7
             if gap / reach < best_gap:
                 best, best_gap = other, gap / reach
         return best
@@ -394,5 +397,4 @@ def _xy(body: Any) -> tuple[float, float]:
 
 def _cov(body: Any) -> tuple[float, float, float]:
     # Two feet tell of the middle of a body by about 5 cm, however long they stand.
-    variance = float(body["pp"]) + 0.0025
-    return variance, 0.0, variance
+    return (variance := float(body["pp"]) + 0.0025), 0.0, variance

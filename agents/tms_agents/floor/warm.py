@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+import inspect
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from tms_agents.devices.scans import Sweep
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
+from tms_agents.floor.freespace import look
+from tms_agents.floor.likelihood import costs
+from tms_agents.floor.prints import follow
 
 _BEAMS, _HZ = 128, 20
+
+
+def compiled_before() -> bool:
+    """Whether numba has kept what it compiled of this source, wherever it keeps it."""
+    return all(map(_kept, (look, costs, follow)))
+
+
+def _kept(kernel: Any) -> bool:
+    source = Path(inspect.getfile(kernel.py_func))
+    files = Path(kernel.stats.cache_path).glob(f"{source.stem}.{kernel.py_func.__name__}-*.nbi")
+    return any(one.stat().st_mtime >= source.stat().st_mtime for one in files)
 
 
 def warm_up() -> None:

@@ -14,9 +14,10 @@ import numpy as np
 
 from tms_agents.simulation import pies
 from tms_agents.simulation.catalogue import ITEMS
+from tms_agents.simulation.floor_choice import say_if_it_compiles, why_no_laser
 from tms_agents.simulation.idle import afternoon
 from tms_agents.simulation.player import Player
-from tms_agents.simulation.room import description
+from tms_agents.simulation.room import FLOOR_AGENT, description
 from tms_agents.simulation.service import server
 from tms_agents.simulation.stage import UTC_NOW, staged
 from tms_agents.simulation.story import MOVED, STEPS, furnish
@@ -31,7 +32,7 @@ class Plan:
     """How to play: against ``url``, or a server of our own with its data in ``data_dir``.
 
     ``port``: 0 is a free one; None is the usual one, or a free one where that is taken. ``laser``: an emulated
-    laser sees the floor, which can follow people at speed 1.
+    laser sees the floor; None: if it can (see ``floor_choice``).
     """
 
     url: str | None = None
@@ -42,12 +43,13 @@ class Plan:
     weights: bool = False
     once: bool = False
     speed: float = 1.0
-    laser: bool = False
+    laser: bool | None = None
     seed: int = 0
 
 
 def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW) -> bool:
     """Play the story; True where every pie was as expected. Goes on living until Ctrl-C unless ``plan.once``."""
+    no_laser = why_no_laser(plan.laser, plan.speed)
     with ExitStack() as stack:
         work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tms-demo-")))
         url = plan.url or stack.enter_context(server(plan.data_dir or work / "data", plan.port, terminal.say))
@@ -56,6 +58,8 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
         try:
             register(town, plan)
             terminal.say("starting the agents ...")
+            if no_laser is None:
+                say_if_it_compiles(terminal.say)
             stage, player = stack.enter_context(
                 staged(
                     town,
@@ -65,11 +69,11 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
                     work,
                     seed=plan.seed,
                     speed=plan.speed,
-                    laser=plan.laser,
+                    laser=no_laser is None,
                     clock=clock,
                 )
             )
-            terminal.devices(stage.hardware.plugs, stage.configs)
+            terminal.devices(stage.hardware.plugs, stage.configs, {} if no_laser is None else {FLOOR_AGENT: no_laser})
             player.play(furnish(player.world))
             right = _story(town, player, plan, terminal)
             if not plan.once:

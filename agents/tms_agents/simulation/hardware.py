@@ -16,7 +16,6 @@ from tms_agents.simulation.cabinet_bench import CabinetBench
 from tms_agents.simulation.robot_bench import STATE_S, RobotBench
 from tms_agents.simulation.room import CABINETS, FLOOR_AGENT, ROBOT, ROBOT_AGENT
 from tms_agents.simulation.world import World
-from tms_client.cli import CommandError
 
 if TYPE_CHECKING:
     from tms_agents.simulation.floor_bench import FloorBench
@@ -108,14 +107,8 @@ class Hardware:
 
 
 def _floor_bench(rng: np.random.Generator) -> FloorBench:
-    try:
-        from tms_agents.simulation.floor_bench import FloorBench
-    except ImportError as error:
-        if error.name is None or error.name.startswith("tms_"):
-            raise
-        raise CommandError(
-            f'the laser needs {error.name}: pip install "robot-town-tms[slam]", or leave it out'
-        ) from error
+    from tms_agents.simulation.floor_bench import FloorBench  # needs numba and scipy, the others do not
+
     return FloorBench(rng)
 
 

@@ -72,8 +72,8 @@ def staged(
 ) -> Iterator[tuple[Stage, Player]]:
     """Devices plugged in, agents started, the room still empty. ``room`` must be registered; files go to ``folder``.
 
-    ``laser``: the floor is seen by an emulated laser and its agent, and nobody walks faster than people do; otherwise
-    by a sensor without device.
+    ``laser``: the floor is seen by an emulated laser and its agent, which can follow at the speeds of
+    ``floor_choice``; otherwise by a sensor without device.
     """
     with ExitStack() as stack:
         hardware = stack.enter_context(plugged_in(seed, laser=laser))
@@ -81,7 +81,7 @@ def staged(
         agents = stack.enter_context(running_agents(configs, url, key))
         if laser:
             stage = Stage(town, room, hardware, agents, None, configs)
-            player = Player(new_world(), Elsewhere(), stage, speed=min(speed, 1.0), clock=clock)
+            player = Player(new_world(), Elsewhere(), stage, speed=speed, clock=clock)
             player.switch_on()
             yield stage, player
             return

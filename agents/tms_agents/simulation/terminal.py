@@ -35,12 +35,17 @@ class Terminal:
     def headline(self, url: str, room: str) -> None:
         self.say(f"The page: {self._bold(f'{url}/')}\nTen objects in room {room!r}; the experiment begins.")
 
-    def devices(self, plugs: Mapping[str, Plugs], configs: Mapping[str, Path]) -> None:
-        """One line per agent: its emulated devices, where they are plugged in, and how it was started."""
+    def devices(self, plugs: Mapping[str, Plugs], configs: Mapping[str, Path], without: Mapping[str, str]) -> None:
+        """One line per agent: its emulated devices, where they are plugged in, and how it was started.
+
+        ``without``: agents without a device, and why.
+        """
         self.say("\nThe agents read emulated devices; name your own in such a file to use them instead:")
         for agent, plug in plugs.items():
             start = " ".join(["tms", *command(agent, configs[agent])])
             self.say(f"  {agent}: {', '.join(_devices(plug))}; {start}")
+        for agent, why in without.items():
+            self.say(f"  {agent}: {why}")
         self.say("Things are put into the cabinets, one by one; boards and readers take their time ...")
 
     def step(self, number: int, title: str) -> None:

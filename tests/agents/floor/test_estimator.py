@@ -117,6 +117,18 @@ def test_masks_seats_and_the_region_are_heeded() -> None:
     assert len(born([*events, *more], "mover")) == 1
 
 
+def test_who_crosses_a_mask_keeps_the_label() -> None:
+    """Nobody is looked for in the lane of a robot, which people cross, too, and where they stand for a while."""
+    lane = [(1.7, 0.5), (3.3, 0.5), (3.3, 3.5), (1.7, 3.5)]
+    way = [(9.0, 4.9, 2.0), (11.0, 3.9, 2.0), (13.0, 2.5, 1.8), (20.0, 2.5, 1.8), (22.0, 1.0, 1.8), (26.0, 1.0, 2.4)]
+    estimator, events = Room(walker(way)).play(25.0, scene=Scene(masks=[lane]))
+    (who,) = born(events, "mover")
+    assert [(one.id, one.stale) for one in estimator.labels()] == [(who.label, False)]
+    # Who has gone in and does not come out is not there for ever.
+    estimator, _ = Room(walker(way[:4])).play(90.0, scene=Scene(masks=[lane]))
+    assert not estimator.labels()
+
+
 def test_two_who_cross_keep_their_labels() -> None:
     one = [(9.0, 4.8, 1.4), (15.0, 0.8, 1.4), (16.0, 0.8, 1.4)]
     two = [(9.0, 1.0, 3.6), (15.0, 3.6, 0.7), (16.0, 3.6, 0.7)]

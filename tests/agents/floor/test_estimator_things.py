@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from floor_rooms import WALLS, Room, Segment, box, cast, thing, together, walker
+from floor_rooms import WALLS, Room, Segment, box, cast, sweep, thing, together, walker
 
-from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, Scene, Vanished
+from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, Scene, Sensor, Vanished
 
 #: Somebody comes in at the right, goes to the upper wall and back; or to the middle, and stays there for long.
 AT_THE_WALL = [(9.0, 4.9, 2.0), (12.0, 2.9, 3.5), (14.0, 2.9, 3.5), (17.0, 4.9, 2.0)]
@@ -64,6 +64,28 @@ def test_a_black_thing_is_found_by_the_little_that_echoes() -> None:
     assert math.hypot(put.xy[0] - 2.0, put.xy[1] - 2.0) < 0.05
     (taken,) = [event for event in events if isinstance(event, Vanished) and event.label == put.label]
     assert 60.0 < taken.t < 61.5
+
+
+def test_a_glossy_thing_that_few_beams_meet_is_kept_though_one_of_them_may_pass() -> None:
+    """Three beams meet it, of ten times they echo once; those at its edges see the wall every other time."""
+    glossy = thing(2.0, 2.0, 0.02, 13.0, 90.0)
+    way = [(9.0, 4.9, 2.45), (12.0, 2.4, 2.35), (17.0, 4.9, 2.45)]
+    room = Room(walker(way), sensors={"A": Sensor(sweep(271), (0.05, 0.05, 0.25 * math.pi))})
+    rng = np.random.default_rng(2)
+    estimator = FloorEstimator(room.sensors)
+    events: list[FloorEvent] = []
+    for name, t, ranges in room.scans(93.0):
+        met = cast(room.sensors[name], glossy(t), WALLS)
+        on_it = np.flatnonzero(met < cast(room.sensors[name], (), WALLS) - 0.01)
+        for i in on_it[ranges[on_it] > met[on_it]]:
+            edge = len(on_it) > 1 and i in (on_it[0], on_it[-1]) and rng.random() < 0.5
+            if not edge:
+                ranges[i] = met[i] + rng.normal(0.0, 0.004) if rng.random() < 0.1 else np.inf
+        events += estimator.scan(name, t, ranges)
+    (put,) = born(events, "object")
+    assert math.hypot(put.xy[0] - 2.0, put.xy[1] - 2.0) < 0.05
+    (taken,) = [event for event in events if isinstance(event, Vanished) and event.label == put.label]
+    assert 90.0 < taken.t < 91.5
 
 
 def test_a_robot_is_one_robot_in_parts_and_beside_people() -> None:
