@@ -7,6 +7,7 @@ thrown over the map (augmented MCL; Thrun, Burgard, Fox 2005, section 8.3.7).
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,7 @@ from tms_agents.slam.geometry import Floats, between, compose, wrapped
 from tms_agents.slam.hypotheses import Hypothesis, hypotheses
 from tms_agents.slam.known import KnownMap
 from tms_agents.slam.motion import OdometryNoise, turned
+from tms_agents.slam.rivals import Seen, rivals_of
 from tms_agents.slam.sampling import drawn_until_enough, everywhere
 from tms_agents.slam.tracking import matched
 from tms_agents.slam.verdict import Limits, Verdict
@@ -48,8 +50,15 @@ class LocalisationSettings:
     few_beams: int = 30
     beams: int = 60
     witnesses: float = 10.0
+    #: A beam through a wall counts as one that misses.
+    through: bool = True
     coarse_m: float = 0.2
     fine_m: float = 0.1
+    #: Scans that are remembered to compare places by; places compared; share of the belief that goes to those that
+    #: cannot be told from the best one.
+    remembered: int = 24
+    rivals: int = 100
+    rivals_share: float = 0.3
     noise: OdometryNoise = field(default_factory=OdometryNoise)
     limits: Limits = field(default_factory=Limits)
     step_m: float = 0.5
@@ -83,6 +92,7 @@ class Localiser:
         self._odometry: Floats | None = None
         self._driven: Floats = np.zeros(2)
         self._scans = 0
+        self._seen: deque[Seen] = deque(maxlen=settings.remembered)
 
     def process(self, odometry: Floats, driven: Floats, points: Floats) -> Estimate:
         """One scan: ``odometry`` (3,), ``driven`` (2,) as in `Log`, ``points`` (M, 2) m seen from the robot."""
@@ -98,10 +108,13 @@ class Localiser:
             else:
                 self._move_and_weigh(motion, noise, points, share)
         self._odometry, self._driven = odometry, driven
+        self._seen.appendleft(Seen(thinned(points, self.settings.beams), odometry, driven))
         self._scans += 1
         found = hypotheses(self.poses, normalised(self.log_weights))
         fits = self._fine(found[0].pose[None], points, self._laser)
         self._verdict.judge(found[0], fits[0], float(moved[0]))
+        if self._verdict.asks:
+            self._look_for_rivals(found[0], points)
         estimate = Estimate(self._verdict.localised, found, len(self.poses))
         self._resample()
         return estimate
@@ -151,14 +164,19 @@ class Localiser:
     def _anywhere(self, points: Floats, effort: float) -> tuple[Floats, Floats]:
         """Particles over all of the map, those drawn from many more that fit the scan; log weights in which all that
         were tried had 1 together before the scan. ``effort`` 0..1 is the share of the work."""
-        s, known = self.settings, self._known
-        tries = int(effort * np.clip(s.tries_per_m2 * known.free_m2, s.particles, s.most_tries))
-        poses = everywhere(known, tries, self._random)
-        costs = self._coarse(poses, thinned(points, s.few_beams), self._laser, through=False)[:, MEAN]
+        s = self.settings
+        poses, costs = self._tried(points, effort)
         weights = normalised(-s.witnesses * costs)
         evidence = np.log(np.mean(np.exp(-s.witnesses * costs)))
         parents = self._enough(poses, weights, int(effort * s.particles))
         return self._near(poses[parents], costs[parents], points, evidence)
+
+    def _tried(self, points: Floats, effort: float) -> tuple[Floats, Floats]:
+        """Poses over all of the map and their costs."""
+        s, known = self.settings, self._known
+        tries = int(effort * np.clip(s.tries_per_m2 * known.free_m2, s.particles, s.most_tries))
+        poses = everywhere(known, tries, self._random)
+        return poses, self._coarse(poses, thinned(points, s.few_beams), self._laser, through=False)[:, MEAN]
 
     def _near(self, poses: Floats, costs: Floats, points: Floats, evidence: float) -> tuple[Floats, Floats]:
         """Each stands for the places around it: moved within them to a better fit."""
@@ -170,8 +188,27 @@ class Localiser:
 
     def _weighed(self, poses: Floats, points: Floats) -> Floats:
         s = self.settings
-        fits = self._coarse(poses, thinned(points, s.beams), self._laser)
+        fits = self._coarse(poses, thinned(points, s.beams), self._laser, through=s.through)
         return -s.witnesses * fits[:, MEAN]
+
+    def _look_for_rivals(self, best: Hypothesis, points: Floats) -> None:
+        """Those that cannot be told from the best one get particles."""
+        s = self.settings
+        tried, costs = self._tried(points, 1.0)
+        seen = list(self._seen)[: s.remembered if not self._verdict.localised else s.remembered // 2]
+        rivals = rivals_of(
+            best.pose, tried, costs, seen, self._known, self._coarse, self._laser, s.noise, s.fine_m, s.rivals
+        )
+        self._verdict.answer(rivals.margin, len(seen) / s.remembered)
+        if self._verdict.localised:
+            return
+        close = rivals.poses[rivals.behind < s.limits.margin]
+        if len(close):
+            fresh = np.repeat(close, s.least, axis=0)
+            fresh = fresh + np.array([0.05, 0.05, 0.03]) * self._random.standard_normal(fresh.shape)
+            weights = np.full(len(fresh), np.log(s.rivals_share / len(fresh)))
+            kept = np.log(1.0 - s.rivals_share) + np.log(np.maximum(normalised(self.log_weights), 1e-300))
+            self.poses, self.log_weights = np.concatenate([self.poses, fresh]), np.concatenate([kept, weights])
 
     def _enough(self, poses: Floats, weights: Floats, most: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         s = self.settings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from tms_agents.slam.geometry import Bytes, Floats, Ints, between, wrapped
+from tms_agents.slam.geometry import Bytes, Floats, Ints, wrapped
 from tms_agents.slam.known import KnownMap
 from tms_agents.slam.matching import match
 
@@ -52,9 +52,3 @@ def _match_known(
             directory, tiles, metres, frame, points, starts[n], priors[n], precision[n], sigma, 1.0,
             poses[n], hessians[n], results[n],
         )  # fmt: skip
-
-
-def within(pose: Floats, other: Floats, metres: float, radians: float) -> bool:
-    """Are two poses (3,) nearer to each other than that?"""
-    apart = between(pose, other)
-    return bool(np.hypot(apart[0], apart[1]) < metres and abs(apart[2]) < radians)

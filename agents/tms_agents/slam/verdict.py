@@ -16,8 +16,10 @@ class Limits:
     """When a pose is believed: one hypothesis has ``weight``, spreads at most ``spread_m`` and ``spread_rad``, and
     ``share`` of the beams that end where the map knows something fit; for ``confirm_m`` of way and ``confirm_scans``.
 
-    A pose ceases to be believed where its weight falls below ``doubt_weight``, the share (averaged) below
-    ``doubt_share``, or the spread doubles.
+    Before that, and every ``again_scans`` after it, other places are looked for: they must be behind by ``margin``
+    (mean cost per beam), and by more where few scans are remembered. A pose ceases to be believed where its weight falls below ``doubt_weight``, the share
+    (averaged) below ``doubt_share``, the spread doubles, another place fits better by ``better``, or for ``blind_m`` of
+    way nothing was seen that the map knows.
     """
 
     weight: float = 0.95
@@ -28,8 +30,12 @@ class Limits:
     confirm_scans: int = 5
     doubt_weight: float = 0.6
     doubt_share: float = 0.5
+    margin: float = 0.07
+    better: float = 0.05
+    again_scans: int = 20
+    blind_m: float = 3.0
     #: Of the beams, at least so many must end in known places to say anything.
-    seen: float = 0.3
+    seen: float = 0.4
     #: Averages of the share follow the newest scan by so much (Thrun et al. 2005, table 8.3).
     slow: float = 0.03
     fast: float = 0.3
@@ -44,8 +50,8 @@ class Verdict:
         self._limits = limits
         self.localised = False
         self._slow = self._fast = float("nan")
-        self._since_m = 0.0
-        self._agreed = 0
+        self._since_m = self._blind_m = 0.0
+        self._agreed = self._unasked = 0
 
     @property
     def surprise(self) -> float:
@@ -55,34 +61,52 @@ class Verdict:
         fallen = max(0.0, 1.0 - self._fast / self._slow)
         return fallen if fallen >= self._limits.alarm else 0.0
 
+    @property
+    def asks(self) -> bool:
+        """Is it time to look for rivals?"""
+        limits = self._limits
+        if self.localised:
+            return self._unasked >= limits.again_scans
+        ripe = self._agreed >= limits.confirm_scans and self._since_m >= limits.confirm_m
+        return ripe and self._unasked >= limits.confirm_scans
+
     def judge(self, best: Hypothesis, fit: Floats, driven_m: float) -> None:
         """``fit`` (4,) of the newest scan at ``best``; ``driven_m`` since the scan before."""
         limits = self._limits
+        self._unasked += 1
         share = share_of(fit, limits.seen)
+        self._blind_m = self._blind_m + driven_m if share is None else 0.0
         if share is not None:
             self._slow = share if np.isnan(self._slow) else self._slow + limits.slow * (share - self._slow)
             self._fast = share if np.isnan(self._fast) else self._fast + limits.fast * (share - self._fast)
         if self.localised:
             if self._doubtful(best):
-                self.localised = False
-                self._restart()
+                self._give_up()
             return
         narrow = best.spread_m <= limits.spread_m and best.spread_rad <= limits.spread_rad
-        if not (best.weight >= limits.weight and narrow and share is not None and self._fast >= limits.share):
-            self._restart()
-            return
-        self._agreed += 1
-        self._since_m += driven_m
-        if self._agreed >= limits.confirm_scans and self._since_m >= limits.confirm_m:
+        if best.weight >= limits.weight and narrow and share is not None and self._fast >= limits.share:
+            self._agreed += 1
+            self._since_m += driven_m
+        else:
+            self._agreed, self._since_m = 0, 0.0
+
+    def answer(self, margin: float, heard: float) -> None:
+        """The best rival is behind by so much, in a share ``heard`` 0..1 of the scans that should be remembered."""
+        self._unasked = 0
+        if self.localised and margin < -self._limits.better:
+            self._give_up()
+        elif not self.localised and margin * np.sqrt(heard) >= self._limits.margin:
             self.localised = True
             self._slow = self._fast
 
     def _doubtful(self, best: Hypothesis) -> bool:
         limits = self._limits
         wide = best.spread_m > 2 * limits.spread_m or best.spread_rad > 2 * limits.spread_rad
-        return best.weight < limits.doubt_weight or wide or self._fast < limits.doubt_share
+        blind = self._blind_m >= limits.blind_m
+        return best.weight < limits.doubt_weight or wide or blind or self._fast < limits.doubt_share
 
-    def _restart(self) -> None:
+    def _give_up(self) -> None:
+        self.localised = False
         self._agreed, self._since_m = 0, 0.0
 
 

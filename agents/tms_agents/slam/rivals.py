@@ -1,0 +1,99 @@
+"""Does another place explain the last scans as well? Particles that were dropped long ago are not there to say so.
+
+The map is searched anew with the newest scan; the best places, and the one that is believed, are followed back through
+the scans before it, each by matching with odometry as prior, and compared by how well the scans fit on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tms_agents.slam.fit import MEAN, Fit
+from tms_agents.slam.geometry import Floats, between, compose
+from tms_agents.slam.known import KnownMap
+from tms_agents.slam.motion import OdometryNoise, turned
+from tms_agents.slam.sampling import bins_of
+from tms_agents.slam.tracking import matched
+
+#: What a pose that was tried stands for (m, rad), and how far apart two places are that differ.
+_AROUND = (0.3, 0.15)
+_APART = (0.5, 0.2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """One scan: ``points`` (M, 2) m as the robot saw them, ``odometry`` (3,) and ``driven`` (2,) as in `Log`."""
+
+    points: Floats
+    odometry: Floats
+    driven: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rivals:
+    """``poses`` (R, 3) of other places than the believed one, the best first; ``behind`` (R,) is by how much their
+    scans fit worse (mean cost per beam, negative: better)."""
+
+    poses: Floats
+    behind: Floats
+
+    @property
+    def margin(self) -> float:
+        """How far the best of them is behind."""
+        return float(self.behind[0]) if len(self.behind) else np.inf
+
+
+def rivals_of(
+    best: Floats,
+    tried: Floats,
+    costs: Floats,
+    seen: Sequence[Seen],
+    known: KnownMap,
+    fit: Fit,
+    laser: Floats,
+    noise: OdometryNoise,
+    sigma_m: float,
+    most: int,
+) -> Rivals:
+    """Of ``best`` (3,) among ``tried`` (N, 3) with ``costs`` (N,) of the newest of the scans ``seen`` (newest
+    first)."""
+    order = np.argsort(costs, kind="stable")[: 50 * most]
+    _, first = np.unique(bins_of(tried[order], *_AROUND), axis=0, return_index=True)
+    candidates = tried[order[np.sort(first)[:most]]]
+    poses, mean = _followed_back(
+        np.concatenate([best[None], candidates]), seen, known, fit, laser, noise, sigma_m
+    )
+    apart = between(poses[:1], poses)
+    others = np.flatnonzero((np.hypot(apart[:, 0], apart[:, 1]) > _APART[0]) | (np.abs(apart[:, 2]) > _APART[1]))
+    others = others[np.argsort(mean[others], kind="stable")]
+    return Rivals(poses[others], mean[others] - mean[0])
+
+
+def _followed_back(
+    poses: Floats,
+    seen: Sequence[Seen],
+    known: KnownMap,
+    fit: Fit,
+    laser: Floats,
+    noise: OdometryNoise,
+    sigma_m: float,
+) -> tuple[Floats, Floats]:
+    """Where each of ``poses`` (N, 3) fits the newest scan best, and its mean cost over all scans."""
+    n = len(poses)
+    spread = np.diag([_AROUND[0] ** 2, _AROUND[0] ** 2, _AROUND[1] ** 2])
+    motion, covariance = np.zeros(3), np.broadcast_to(spread, (n, 3, 3))
+    newest, total = poses, np.zeros(n)
+    for number, scan in enumerate(seen):
+        if number:
+            before = seen[number - 1]
+            motion = between(before.odometry, scan.odometry)
+            covariance = turned(noise.covariance(motion, before.driven - scan.driven), poses[:, 2])
+        priors = compose(poses, np.broadcast_to(motion, (n, 3)))
+        precision = np.ascontiguousarray(np.linalg.inv(covariance))
+        poses, _, _ = matched(known, scan.points, priors, priors, precision, sigma_m)
+        total += fit(poses, scan.points, laser)[:, MEAN]
+        newest = newest if number else poses
+    return newest, total / len(seen)
