@@ -8,15 +8,15 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
-import numba
 import numpy as np
 
+from tms_agents.commands import slam_localise
 from tms_agents.commands.slam_compare import compare
+from tms_agents.commands.slam_log import add_log_options, make_folder, read, set_threads
 from tms_agents.slam.export import write_map, write_trajectory
-from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
+from tms_agents.slam.logs import Log
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings
 from tms_client.cli import ArgumentParser, CommandError
@@ -28,14 +28,14 @@ def main(argv: Sequence[str]) -> int:
     parser = ArgumentParser(prog="tms slam", description="Laser mapping: build a map from a log, compare results.")
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="COMMAND")
     run = kinds.add_parser("run", help="trajectory and map of a recorded drive")
-    run.add_argument("log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl; each may be .gz")
+    add_log_options(run)
     run.add_argument("--out", type=Path, required=True, metavar="DIR")
-    run.add_argument("--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)")
     run.add_argument("--particles", type=int, default=DEFAULTS.particles, metavar="N")
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
-    run.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
     run.set_defaults(work=_run)
+    place = kinds.add_parser("localise", help="where a robot is in a map that is known, from anywhere")
+    slam_localise.add_options(place)
     other = kinds.add_parser("compare", help="two results, or one with known relations")
     other.add_argument("a", type=Path, metavar="A", help="DIR of tms slam run, or a trajectory")
     other.add_argument("b", type=Path, metavar="B", help="the same, or relations (.relations, may be .gz)")
@@ -55,15 +55,9 @@ def _run(arguments: argparse.Namespace) -> int:
         raise CommandError("--resolution: from 0.01 to 0.5 m")
     if arguments.seed < 0:
         raise CommandError("--seed: not negative")
-    cores = numba.get_num_threads()
-    if not 0 <= arguments.threads <= cores:
-        raise CommandError(f"--threads: from 1 to {cores}")
-    log = _log(arguments)
-    try:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CommandError(f"{arguments.out}: {error.strerror or error}") from error
-    numba.set_num_threads(arguments.threads or cores)
+    set_threads(arguments.threads)
+    log = read(arguments)
+    make_folder(arguments.out)
     settings = Settings(particles=arguments.particles, resolution=arguments.resolution, seed=arguments.seed)
     began = time.perf_counter()
     result = build_map(log, settings, _bar())
@@ -81,20 +75,6 @@ def _run(arguments: argparse.Namespace) -> int:
         f"({stats['real_time_factor']:.0f} x real time), {stats['loops']} revisits -> {arguments.out}\n"
     )
     return 0
-
-
-def _log(arguments: argparse.Namespace) -> Log:
-    try:
-        log = read_log(arguments.log)
-        if arguments.models is not None:
-            log = replace(log, laser=parse_laser(arguments.models.read_text()))
-    except OSError as error:
-        raise CommandError(f"{error.filename or arguments.log}: {error.strerror or error}") from error
-    except LogError as error:
-        raise CommandError(f"{arguments.log}: {error}") from error
-    if log.bad_lines:
-        sys.stderr.write(f"{arguments.log}: {log.bad_lines} lines could not be read and were left out\n")
-    return log
 
 
 def _stats(log: Log, settings: Settings, result: Result, seconds: float) -> dict[str, float]:

@@ -42,17 +42,22 @@ def write_map(folder: Path, grid: GridMap, path: Floats) -> None:
         resolution=grid.resolution,
         path=path,
     )
-    trinary = np.full(grid.cells.shape, _GREY["unknown"], dtype=np.uint8)
-    trinary[~unknown & (probabilities < 0.5)] = _GREY["free"]
-    trinary[~unknown & (probabilities > OCCUPIED)] = _GREY["occupied"]
+    trinary = _trinary(probabilities)
     Image.fromarray(trinary[::-1]).save(folder / "map.pgm")
     _write_yaml(folder / "map.yaml", "map.pgm", grid, "trinary")
     raw = np.where(unknown, 255, np.round(100 * np.where(unknown, 0.0, probabilities))).astype(np.uint8)
     Image.fromarray(raw[::-1]).save(folder / "map_raw.pgm")
     _write_yaml(folder / "map_raw.yaml", "map_raw.pgm", grid, "raw")
-    picture = np.repeat(trinary[:, :, None], 3, axis=2)
-    _draw(picture, grid, path)
-    Image.fromarray(picture[::-1]).save(folder / "map.png")
+    Image.fromarray(map_picture(probabilities, grid.origin, grid.resolution, path)).save(folder / "map.png")
+
+
+def map_picture(occupancy: Floats, origin: tuple[float, float], resolution: float, path: Floats) -> Bytes:
+    """(H, W, 3) of ``occupancy`` (H, W; row 0 lowest, NaN unknown) with ``path`` (K, 2 or more), its first row on
+    top."""
+    picture = np.repeat(_trinary(occupancy)[:, :, None], 3, axis=2)
+    if len(path):
+        _draw(picture, (path[:, :2] - np.array(origin)) / resolution)
+    return picture[::-1]
 
 
 def paths_picture(paths: list[Floats], pixels: int = 900) -> Bytes:
@@ -76,9 +81,17 @@ def _places(cells: Floats) -> NDArray[np.int64]:
     return np.concatenate(pieces).astype(np.int64)
 
 
-def _draw(picture: Bytes, grid: GridMap, path: Floats) -> None:
-    """The path, a pixel wide, from blue to red."""
-    places = _places((path[:, :2] - np.array(grid.origin)) / grid.resolution)
+def _trinary(occupancy: Floats) -> Bytes:
+    """The grey values that ``map_server`` reads as free, occupied and unknown."""
+    grey = np.full(occupancy.shape, _GREY["unknown"], dtype=np.uint8)
+    grey[occupancy < 0.5] = _GREY["free"]
+    grey[occupancy > OCCUPIED] = _GREY["occupied"]
+    return grey
+
+
+def _draw(picture: Bytes, cells: Floats) -> None:
+    """The path ``cells`` (K, 2), a pixel wide, from blue to red."""
+    places = _places(cells)
     share = np.linspace(0.0, 1.0, len(places))
     inside = ((places >= 0) & (places < np.array(picture.shape[1::-1]))).all(axis=1)
     colours = np.stack([255 * share, 0 * share + 60, 255 * (1 - share)], axis=-1).astype(np.uint8)

@@ -199,7 +199,7 @@ class Localiser:
         rivals = rivals_of(
             best.pose, tried, costs, seen, self._known, self._coarse, self._laser, s.noise, s.fine_m, s.rivals
         )
-        self._verdict.answer(rivals.margin, len(seen) / s.remembered)
+        self._verdict.answer(rivals.margin, rivals.sigmas, len(seen) / s.remembered)
         if self._verdict.localised:
             return
         close = rivals.poses[rivals.behind < s.limits.margin]

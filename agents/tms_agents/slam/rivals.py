@@ -35,15 +35,21 @@ class Seen:
 @dataclass(frozen=True, slots=True, eq=False)
 class Rivals:
     """``poses`` (R, 3) of other places than the believed one, the best first; ``behind`` (R,) is by how much their
-    scans fit worse (mean cost per beam, negative: better)."""
+    scans fit worse (mean cost per beam, negative: better), ``errors`` (R,) the standard error of that."""
 
     poses: Floats
     behind: Floats
+    errors: Floats
 
     @property
     def margin(self) -> float:
         """How far the best of them is behind."""
-        return float(self.behind[0]) if len(self.behind) else np.inf
+        return float(self.behind.min(initial=np.inf))
+
+    @property
+    def sigmas(self) -> float:
+        """The same in standard errors, of the one where that is least."""
+        return float((self.behind / np.maximum(self.errors, 1e-9)).min(initial=np.inf))
 
 
 def rivals_of(
@@ -63,13 +69,15 @@ def rivals_of(
     order = np.argsort(costs, kind="stable")[: 50 * most]
     _, first = np.unique(bins_of(tried[order], *_AROUND), axis=0, return_index=True)
     candidates = tried[order[np.sort(first)[:most]]]
-    poses, mean = _followed_back(
+    poses, costs_of_scans = _followed_back(
         np.concatenate([best[None], candidates]), seen, known, fit, laser, noise, sigma_m
     )
     apart = between(poses[:1], poses)
     others = np.flatnonzero((np.hypot(apart[:, 0], apart[:, 1]) > _APART[0]) | (np.abs(apart[:, 2]) > _APART[1]))
-    others = others[np.argsort(mean[others], kind="stable")]
-    return Rivals(poses[others], mean[others] - mean[0])
+    behind = (costs_of_scans - costs_of_scans[:, :1])[:, others]
+    order = np.argsort(behind.mean(axis=0), kind="stable")
+    error = behind.std(axis=0) / np.sqrt(max(1, len(seen) - 1))
+    return Rivals(poses[others[order]], behind.mean(axis=0)[order], error[order])
 
 
 def _followed_back(
@@ -81,11 +89,11 @@ def _followed_back(
     noise: OdometryNoise,
     sigma_m: float,
 ) -> tuple[Floats, Floats]:
-    """Where each of ``poses`` (N, 3) fits the newest scan best, and its mean cost over all scans."""
+    """Where each of ``poses`` (N, 3) fits the newest scan best, and the mean costs per beam (S, N) of all scans."""
     n = len(poses)
     spread = np.diag([_AROUND[0] ** 2, _AROUND[0] ** 2, _AROUND[1] ** 2])
     motion, covariance = np.zeros(3), np.broadcast_to(spread, (n, 3, 3))
-    newest, total = poses, np.zeros(n)
+    newest, costs = poses, np.zeros((len(seen), n))
     for number, scan in enumerate(seen):
         if number:
             before = seen[number - 1]
@@ -94,6 +102,6 @@ def _followed_back(
         priors = compose(poses, np.broadcast_to(motion, (n, 3)))
         precision = np.ascontiguousarray(np.linalg.inv(covariance))
         poses, _, _ = matched(known, scan.points, priors, priors, precision, sigma_m)
-        total += fit(poses, scan.points, laser)[:, MEAN]
+        costs[number] = fit(poses, scan.points, laser)[:, MEAN]
         newest = newest if number else poses
-    return newest, total / len(seen)
+    return newest, costs

@@ -16,10 +16,10 @@ class Limits:
     """When a pose is believed: one hypothesis has ``weight``, spreads at most ``spread_m`` and ``spread_rad``, and
     ``share`` of the beams that end where the map knows something fit; for ``confirm_m`` of way and ``confirm_scans``.
 
-    Before that, and every ``again_scans`` after it, other places are looked for: they must be behind by ``margin``
-    (mean cost per beam), and by more where few scans are remembered. A pose ceases to be believed where its weight falls below ``doubt_weight``, the share
-    (averaged) below ``doubt_share``, the spread doubles, another place fits better by ``better``, or for ``blind_m`` of
-    way nothing was seen that the map knows.
+    Before that, and every ``again_scans`` after it, other places are looked for: they must fit worse by ``margin``
+    (mean cost per beam) and by ``sigmas`` standard errors, more where few scans are remembered. A pose ceases to be
+    believed where its weight falls below ``doubt_weight``, the share (averaged) below ``doubt_share``, the spread
+    doubles, another place fits better by as much, or for ``blind_m`` of way nothing was seen that the map knows.
     """
 
     weight: float = 0.95
@@ -30,8 +30,8 @@ class Limits:
     confirm_scans: int = 5
     doubt_weight: float = 0.6
     doubt_share: float = 0.5
-    margin: float = 0.07
-    better: float = 0.05
+    margin: float = 0.03
+    sigmas: float = 2.3
     again_scans: int = 20
     blind_m: float = 3.0
     #: Of the beams, at least so many must end in known places to say anything.
@@ -90,12 +90,14 @@ class Verdict:
         else:
             self._agreed, self._since_m = 0, 0.0
 
-    def answer(self, margin: float, heard: float) -> None:
-        """The best rival is behind by so much, in a share ``heard`` 0..1 of the scans that should be remembered."""
+    def answer(self, margin: float, sigmas: float, heard: float) -> None:
+        """The best rival is behind by ``margin``, ``sigmas`` standard errors, in a share ``heard`` 0..1 of the scans
+        that should be remembered."""
+        limits = self._limits
         self._unasked = 0
-        if self.localised and margin < -self._limits.better:
+        if self.localised and margin < -limits.margin and sigmas < -1.0:
             self._give_up()
-        elif not self.localised and margin * np.sqrt(heard) >= self._limits.margin:
+        elif not self.localised and margin >= limits.margin and sigmas * np.sqrt(heard) >= limits.sigmas:
             self.localised = True
             self._slow = self._fast
 

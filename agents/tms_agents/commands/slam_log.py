@@ -1,0 +1,52 @@
+"""What the commands of ``tms slam`` share: the log they read, the folder they write to, the threads they use."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numba
+
+from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
+from tms_client.cli import CommandError
+
+
+def add_log_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl; each may be .gz")
+    parser.add_argument(
+        "--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)"
+    )
+    parser.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
+
+
+def read(arguments: argparse.Namespace) -> Log:
+    """The log, with the laser where ``--models`` says. Raises ``CommandError``."""
+    try:
+        log = read_log(arguments.log)
+        if arguments.models is not None:
+            log = replace(log, laser=parse_laser(arguments.models.read_text()))
+    except OSError as error:
+        raise CommandError(f"{error.filename or arguments.log}: {error.strerror or error}") from error
+    except LogError as error:
+        raise CommandError(f"{arguments.log}: {error}") from error
+    if log.bad_lines:
+        sys.stderr.write(f"{arguments.log}: {log.bad_lines} lines could not be read and were left out\n")
+    return log
+
+
+def make_folder(folder: Path) -> None:
+    """Raises ``CommandError``."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CommandError(f"{folder}: {error.strerror or error}") from error
+
+
+def set_threads(wanted: int) -> None:
+    """0: all cores. Raises ``CommandError``."""
+    cores = numba.get_num_threads()
+    if not 0 <= wanted <= cores:
+        raise CommandError(f"--threads: from 1 to {cores}")
+    numba.set_num_threads(wanted or cores)
