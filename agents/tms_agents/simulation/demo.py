@@ -18,6 +18,7 @@ from tms_agents.simulation.floor_choice import say_if_it_compiles, why_no_laser
 from tms_agents.simulation.idle import afternoon
 from tms_agents.simulation.player import Player
 from tms_agents.simulation.room import FLOOR_AGENT, description
+from tms_agents.simulation.room_map import RoomMap, mapping
 from tms_agents.simulation.service import server
 from tms_agents.simulation.stage import UTC_NOW, staged
 from tms_agents.simulation.story import MOVED, STEPS, furnish
@@ -25,6 +26,9 @@ from tms_agents.simulation.terminal import Terminal
 from tms_client import NotFound, Retry, Town, TownError
 from tms_client.cli import CommandError
 from tms_schemas.objects import ObjectFields, ProductIn
+
+#: The mapper compiles at its first start; then the story may be over before the map is there.
+PATIENCE_S = 60.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -57,6 +61,7 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
         town = stack.enter_context(Town(url, plan.key, retry=Retry(attempts=8)))
         try:
             register(town, plan)
+            drawn = stack.enter_context(mapping(town, plan.room, work, plan.seed, terminal.say))
             terminal.say("starting the agents ...")
             if no_laser is None:
                 say_if_it_compiles(terminal.say)
@@ -75,7 +80,9 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
             )
             terminal.devices(stage.hardware.plugs, stage.configs, {} if no_laser is None else {FLOOR_AGENT: no_laser})
             player.play(furnish(player.world))
-            right = _story(town, player, plan, terminal)
+            right = _story(town, player, plan, terminal, drawn)
+            if drawn is not None:
+                drawn.poll(terminal.say, PATIENCE_S)
             if not plan.once:
                 terminal.say(f"\nThe room lives on; look at {url}/ (Ctrl-C ends it).")
                 player.play(afternoon(player.world, np.random.default_rng(plan.seed)))
@@ -101,9 +108,11 @@ def register(town: Town, plan: Plan) -> None:
         )
 
 
-def _story(town: Town, player: Player, plan: Plan, terminal: Terminal) -> bool:
+def _story(town: Town, player: Player, plan: Plan, terminal: Terminal, drawn: RoomMap | None) -> bool:
     wrong = 0
     for number, step in enumerate(STEPS):
+        if drawn is not None:
+            drawn.poll(terminal.say)
         terminal.step(number, step.title)
         player.play(step.act(player.world))
         found = pies.pies_of(town.placements(plan.room), MOVED)

@@ -29,7 +29,7 @@ class FloorBench:
     def __init__(self, rng: np.random.Generator, clock: Callable[[], float] = time.monotonic) -> None:
         self.device = ScipDevice(self.scan, "UST-20LX", clock=clock)
         mount = Mount(name="laser", laser=FINE, pose=LASER_POSE, reported=LASER_POSE)
-        self._room = LiveRoom(_walls(), _furniture(), [mount], rng, feet="legs")
+        self._room = LiveRoom(walls(), furniture(), [mount], rng, feet="legs")
         self._clock = clock
         self._bodies: dict[str, tuple[Xy, Xy]] = {}  # before and after the last step
         self._robots: dict[str, tuple[Xy, Xy, float]] = {}
@@ -88,13 +88,13 @@ def _on_bed(xy: Xy) -> bool:
     return x0 <= xy[0] <= x1 and y0 <= xy[1] <= y1
 
 
-def _walls() -> list[Wall]:
+def walls() -> list[Wall]:
     w, d = SIZE
     corners = [(0.0, 0.0), (w, 0.0), (w, d), (0.0, d)]
     return [Wall(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
 
 
-def _furniture() -> list[Furniture]:
+def furniture() -> list[Furniture]:
     """Cabinets stand on the floor, bed and table on legs."""
     pieces = [_piece(f"leg of {name}", outline, "legs") for name, outline in (("bed", BED), ("table", TABLE))]
     return pieces + [_piece(one.id, one.outline, "box") for one in CABINETS]

@@ -13,6 +13,16 @@ export const room = (id) => get(`/v1/rooms/${encodeURIComponent(id)}`);
 export const objects = (id) => pages(`/v1/objects?limit=200&room=${encodeURIComponent(id)}`);
 export const search = async (words) => (await get(`/v1/objects?limit=5&q=${encodeURIComponent(words)}`)).items;
 export const location = (tag) => get(`/v1/objects/${encodeURIComponent(tag)}/location`);
+/** The newest version of each map of a room whose place in the room is known. */
+export async function maps(id) {
+  const found = await pages(`/v1/maps?limit=200&room=${encodeURIComponent(id)}`);
+  const placed = found.filter((one) => one.version > 0 && one.map_to_room);
+  return Promise.all(placed.map(async (one) => {
+    const path = `/v1/maps/${encodeURIComponent(one.id)}`;
+    const { bounds } = await get(`${path}/versions/${one.version}`);
+    return { ...one, bounds, picture: `${path}.png?version=${one.version}` };
+  }));
+}
 export const login = (key) => call("/v1/login", {
   method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ key }),
 });

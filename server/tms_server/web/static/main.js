@@ -51,6 +51,7 @@ function enter(room) {
   document.title = `${room.name}: where things are`;
   colours.furnish(room);
   plan.furnish(room);
+  chart();
   end = follow(room.id, {
     frame(frame) {
       const names = [...model.objects.keys()].length;
@@ -60,6 +61,18 @@ function enter(room) {
     },
     state: connection,
   });
+}
+
+/** What robots have mapped of the room, now. */
+async function chart() {
+  const of = model;
+  if (of === null) return;
+  try {
+    const maps = await api.maps(of.room.id);
+    if (of === model) plan.chart(maps);
+  } catch {
+    // the page lives without maps
+  }
 }
 
 /** The second language of the names comes from the object database, once. */
@@ -152,4 +165,5 @@ byId("answer-close").addEventListener("click", () => {
 });
 
 setInterval(status, 1000);
+setInterval(chart, 15_000);
 start();

@@ -13,10 +13,11 @@ export class Plan {
     this._root = root;
     this._on = on;
     this._ground = svg("g");
+    this._maps = svg("g");
     this._labels = svg("g");
     this._movers = svg("g");
     this._names = svg("g");
-    root.replaceChildren(this._ground, this._labels, this._movers, this._names);
+    root.replaceChildren(this._ground, this._maps, this._labels, this._movers, this._names);
     for (const [kind, words] of [
       ["cabinet", "in a cabinet"], ["floor", "on the floor"],
       ["robot", "in the robot's hand"], ["table", "put down by the robot"],
@@ -35,7 +36,12 @@ export class Plan {
     });
     this._ground.replaceChildren(svg("polygon", { class: "walls", points: points(room.outline) }));
     for (const one of room.furniture) this._ground.append(furniture(one, room));
-    for (const group of [this._labels, this._movers, this._names]) group.replaceChildren();
+    for (const group of [this._maps, this._labels, this._movers, this._names]) group.replaceChildren();
+  }
+
+  /** Lay what robots have mapped over the ground; the pictures are in cells of the maps, their rows go down. */
+  chart(maps) {
+    keyed(this._maps, maps.filter((one) => one.bounds), (one) => one.picture, mapPicture, () => {});
   }
 
   /** Draw what moves. */
@@ -68,6 +74,15 @@ export class Plan {
     node.addEventListener("pointerleave", () => this._on.label(null));
     return node;
   }
+}
+
+function mapPicture({ id, picture, bounds: [x0, y0, x1, y1], resolution, origin, map_to_room: [x, y, theta] }) {
+  const cell = 100 * resolution;
+  return svg("image", {
+    class: "map", "data-map": id, href: picture, width: x1 - x0, height: y1 - y0, preserveAspectRatio: "none",
+    transform: `translate(${100 * x} ${-100 * y}) rotate(${(-180 / Math.PI) * theta}) `
+      + `translate(${100 * origin[0] + cell * x0} ${-100 * origin[1] - cell * y1}) scale(${cell})`,
+  });
 }
 
 function furniture(one, room) {
