@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 from server_process import ServerProcess
@@ -22,6 +24,7 @@ from tms_agents.simulation.room import description
 from tms_agents.simulation.stage import staged
 from tms_agents.simulation.story import STEPS, Step, furnish
 from tms_client import Town
+from tms_schemas.maps import MapIn
 
 from .conftest import Watched
 
@@ -153,6 +156,26 @@ def test_names_are_text_and_rooms_can_be_chosen(server: ServerProcess, watched: 
     assert page.locator("main img, main script").count() == 0
     page.reload()
     expect(page.get_by_role("heading", level=1)).to_have_text(evil)
+
+
+def test_maps_lie_where_they_belong(server: ServerProcess, watched: Watched) -> None:
+    """A map turned by a quarter: 2 m long and 1 m wide, from (2, 1) up and to the left."""
+    page = watched.page
+    with Town(server.url) as town:
+        register(town, Plan())
+        town.maps.put("demo", MapIn(room="demo", resolution=0.1, map_to_room=(2.0, 1.0, math.pi / 2)))
+        town.maps.put("elsewhere", MapIn(room="demo", resolution=0.1))  # nobody knows where it lies
+        for name in ("demo", "elsewhere"):
+            town.maps.upload(name, np.ones((10, 20)), (0.0, 0.0), agent="robot")
+        page.goto(server.url)
+        image = page.locator("image.map")
+        expect(image).to_have_count(1)
+        walls, shown = page.locator(".walls").bounding_box(), image.bounding_box()
+        assert walls is not None and shown is not None
+        metre = walls["width"] / 6.0
+        left, bottom = shown["x"] - walls["x"], walls["y"] + walls["height"] - shown["y"] - shown["height"]
+        found = [value / metre for value in (left, bottom, shown["width"], shown["height"])]
+        assert found == pytest.approx([1.0, 1.0, 1.0, 2.0], abs=0.1)
 
 
 def test_a_server_with_keys_asks_for_one(server: ServerProcess, watched: Watched, tmp_path: Path) -> None:

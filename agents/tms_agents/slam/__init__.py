@@ -1,8 +1,23 @@
-"""Laser mapping: a particle filter over maps that share tiles, and loop closing behind it. No I/O to any server."""
+"""Laser mapping: a particle filter over maps that share tiles, and loop closing behind it; localisation in a known map. No I/O to any server."""
 
 from tms_agents.slam.filter import ParticleFilter
+from tms_agents.slam.known import MapError, known_map
+from tms_agents.slam.localisation import LocalisationSettings, Localiser
 from tms_agents.slam.logs import Log, LogError, read_log
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings
 
-__all__ = ["Log", "LogError", "ParticleFilter", "Progress", "Result", "Settings", "build_map", "read_log"]
+__all__ = [
+    "LocalisationSettings",
+    "Localiser",
+    "Log",
+    "LogError",
+    "MapError",
+    "ParticleFilter",
+    "Progress",
+    "Result",
+    "Settings",
+    "build_map",
+    "known_map",
+    "read_log",
+]

@@ -16,7 +16,8 @@ class Limits:
     """When a pose is believed: one hypothesis has ``weight``, spreads at most ``spread_m`` and ``spread_rad``, and
     ``share`` of the beams that end where the map knows something fit; for ``confirm_m`` of way and ``confirm_scans``.
 
-    Before that, and every ``again_scans`` after it, other places are looked for: they must fit worse by ``margin``
+    Before that, and every ``again_scans`` after it (sooner where the share
+    fell by ``worse``), other places are looked for: they must fit worse by ``margin``
     (mean cost per beam) and by ``sigmas`` standard errors, more where few scans are remembered. A pose ceases to be
     believed where its weight falls below ``doubt_weight``, the share (averaged) below ``doubt_share``, the spread
     doubles, another place fits better by as much, or for ``blind_m`` of way nothing was seen that the map knows.
@@ -33,6 +34,7 @@ class Limits:
     margin: float = 0.03
     sigmas: float = 2.3
     again_scans: int = 20
+    worse: float = 0.05
     blind_m: float = 3.0
     #: Of the beams, at least so many must end in known places to say anything.
     seen: float = 0.4
@@ -66,7 +68,8 @@ class Verdict:
         """Is it time to look for rivals?"""
         limits = self._limits
         if self.localised:
-            return self._unasked >= limits.again_scans
+            worse = self._fast < self._slow - limits.worse
+            return self._unasked >= (limits.confirm_scans if worse else limits.again_scans)
         ripe = self._agreed >= limits.confirm_scans and self._since_m >= limits.confirm_m
         return ripe and self._unasked >= limits.confirm_scans
 
