@@ -21,7 +21,7 @@ import numpy as np
 
 from tms_agents.simulation.survey import recording
 from tms_agents.slam import LocalisationSettings, Localiser, Log, known_map, read_log
-from tms_agents.slam.geometry import compose
+from tms_agents.slam.geometry import between, compose
 from tms_agents.slam.keyframes import key_scans
 from tms_agents.slam.logs_recording import parse_recording
 from tms_client import Town
@@ -44,24 +44,23 @@ def main() -> int:
     keys = [int(n) for n in key_scans(log, 0.25, 0.2) if n >= arguments.begin * len(log)]
     print(f"map {plan.name}, version {plan.version}: the robot may be anywhere on {known.free_m2:.0f} m2")
     localised = False
-    for n in keys:
+    for number, n in enumerate(keys):
         estimate = localiser.process(log.odometry[n], log.driven[n], log.points(n))
         best = estimate.best
         driven = log.driven[n, 0] - log.driven[keys[0], 0]
         where = f"x {best.pose[0]:.2f} m, y {best.pose[1]:.2f} m, {np.degrees(best.pose[2]):.0f} deg"
         if estimate.localised != localised:
             localised = estimate.localised
-            print(f"after {driven:.1f} m: {'localised at' if localised else 'in doubt, last at'} {where} in the map")
-        elif not localised:
-            print(
-                f"after {driven:.1f} m: {estimate.particles} particles, the best of them {best.weight:.0%} at {where}"
-            )
+            print(f"after {driven:.1f} m: {'localised at' if localised else 'in doubt, last at'} {where}")
+        elif not localised and number % 5 == 0:
+            print(f"after {driven:.1f} m: {estimate.particles} particles, the best guess {best.weight:.0%} at {where}")
     if not localised:
         print("the robot does not know where it is")
         return 1
-    print(f"in the end at {where} in the map, +- {best.spread_m:.2f} m")
+    pose = compose(best.pose, between(log.odometry[keys[-1]], log.odometry[-1]))  # from the last scan on by odometry
+    print(f"in the end at x {pose[0]:.2f} m, y {pose[1]:.2f} m in the map, +- {best.spread_m:.2f} m")
     if plan.map_to_room is not None:
-        x, y, theta = compose(np.array(plan.map_to_room), best.pose)
+        x, y, theta = compose(np.array(plan.map_to_room), pose)
         print(f"in room {plan.room!r} at x {x:.2f} m, y {y:.2f} m, {np.degrees(theta):.0f} deg")
     return 0
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +17,8 @@ from tms_agents.simulation.room import CABINETS, SIZE, SPOTS
 from tms_agents.simulation.survey import START, poses, recording
 from tms_agents.slam.geometry import transform
 from tms_client import Town
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.timeout(300)  # the mapper compiles where it never ran before
@@ -30,6 +35,15 @@ def test_the_map_on_the_server_is_that_of_the_room(tmp_path: Path) -> None:
                 drawn.poll(said.append)
         assert [line.split(" (")[1].split(";")[0] for line in said] == ["version 1", "version 2"]
         found = town.map("demo")
+        example = [sys.executable, "examples/localise_in_map.py", "--url", server.url, "--seed", "8"]
+        done = subprocess.run(example, cwd=ROOT, capture_output=True, text=True, timeout=200, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "localised at x" in done.stdout
+    where = re.search(r"in room 'demo' at x (.*) m, y (.*) m, (.*) deg", done.stdout)
+    assert where is not None
+    x, y, theta = list(poses())[-1]
+    assert np.hypot(float(where[1]) - x, float(where[2]) - y) < 0.1
+    assert float(where[3]) == pytest.approx(np.degrees(theta), abs=12)
     assert found.map_to_room == pytest.approx(START)
     rows, columns = np.nonzero(found.occupancy > 0.65)
     cells = np.column_stack([columns, rows]) + 0.5

@@ -1,4 +1,5 @@
-"""Laser mapping: a particle filter over maps that share tiles, and loop closing behind it; localisation in a known map. No I/O to any server."""
+"""Laser mapping: a particle filter over maps that share tiles, and loop closing behind it; localisation in a known
+map. No I/O to any server."""
 
 from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.known import MapError, known_map

@@ -16,10 +16,10 @@ _GOLDEN = 0.6180339887498949
 
 def everywhere(known: KnownMap, count: int, random: np.random.Generator) -> Floats:
     """(count, 3) poses over all free places of the map, evenly: the same number on every part, turned evenly."""
-    where = ((np.arange(count) + random.random()) * (len(known.standing) / count)).astype(np.int64)
+    where = ((np.arange(count) + random.uniform()) * (len(known.standing) / count)).astype(np.int64)
     cells = known.standing[np.minimum(where, len(known.standing) - 1)]
-    places = (cells + random.random((count, 2))) / known.frame[2] + known.frame[:2]
-    turns = (np.arange(count) * _GOLDEN + random.random()) % 1.0
+    places = (cells + random.uniform(size=(count, 2))) / known.frame[2] + known.frame[:2]
+    turns = (np.arange(count) * _GOLDEN + random.uniform()) % 1.0
     return np.column_stack([places, wrapped(2 * np.pi * turns)])
 
 
@@ -50,7 +50,7 @@ def drawn_until_enough(
     random: np.random.Generator,
 ) -> NDArray[np.int64]:
     """Parents of the next particles, in proportion to ``weights`` (N,): as many as their spread needs."""
-    parents = random.permutation(low_variance(weights, most, float(random.random())))
+    parents = random.permutation(low_variance(weights, most, float(random.uniform())))
     keys = bins_of(poses[parents], *bins)
     _, first = np.unique(keys, axis=0, return_index=True)
     fresh = np.zeros(most, dtype=np.int64)

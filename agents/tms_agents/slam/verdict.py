@@ -16,11 +16,11 @@ class Limits:
     """When a pose is believed: one hypothesis has ``weight``, spreads at most ``spread_m`` and ``spread_rad``, and
     ``share`` of the beams that end where the map knows something fit; for ``confirm_m`` of way and ``confirm_scans``.
 
-    Before that, and every ``again_scans`` after it (sooner where the share
-    fell by ``worse``), other places are looked for: they must fit worse by ``margin``
-    (mean cost per beam) and by ``sigmas`` standard errors, more where few scans are remembered. A pose ceases to be
-    believed where its weight falls below ``doubt_weight``, the share (averaged) below ``doubt_share``, the spread
-    doubles, another place fits better by as much, or for ``blind_m`` of way nothing was seen that the map knows.
+    Before that, and every ``again_scans`` after it (sooner where the share fell by ``worse``), other places are looked
+    for: they must fit worse by ``margin`` (mean cost per beam) and by ``sigmas`` standard errors, more where few scans
+    are remembered, or by ``clear``. A pose ceases to be believed where its weight falls below ``doubt_weight``, the
+    share (averaged) below ``doubt_share``, the spread doubles, another place fits better by as much, or for
+    ``blind_m`` of way nothing was seen that the map knows.
     """
 
     weight: float = 0.95
@@ -33,6 +33,7 @@ class Limits:
     doubt_share: float = 0.5
     margin: float = 0.03
     sigmas: float = 2.3
+    clear: float = 0.25
     again_scans: int = 20
     worse: float = 0.05
     blind_m: float = 3.0
@@ -100,7 +101,9 @@ class Verdict:
         self._unasked = 0
         if self.localised and margin < -limits.margin and sigmas < -1.0:
             self._give_up()
-        elif not self.localised and margin >= limits.margin and sigmas * np.sqrt(heard) >= limits.sigmas:
+        elif not self.localised and (
+            margin >= limits.clear or (margin >= limits.margin and sigmas * np.sqrt(heard) >= limits.sigmas)
+        ):
             self.localised = True
             self._slow = self._fast
 
