@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tms_agents.commands import slam_localise
+from tms_agents.commands import slam_localise, slam_upload
 from tms_agents.commands.slam_compare import compare
 from tms_agents.commands.slam_log import add_log_options, make_folder, read, set_threads
 from tms_agents.slam.export import write_map, write_trajectory
@@ -33,6 +33,7 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument("--particles", type=int, default=DEFAULTS.particles, metavar="N")
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
+    slam_upload.add_options(run)
     run.set_defaults(work=_run)
     place = kinds.add_parser("localise", help="where a robot is in a map that is known, from anywhere")
     slam_localise.add_options(place)
@@ -60,21 +61,31 @@ def _run(arguments: argparse.Namespace) -> int:
     make_folder(arguments.out)
     settings = Settings(particles=arguments.particles, resolution=arguments.resolution, seed=arguments.seed)
     began = time.perf_counter()
-    result = build_map(log, settings, _bar())
-    seconds = time.perf_counter() - began
-    if sys.stderr.isatty():
-        sys.stderr.write("\n")
+    with slam_upload.uploading(arguments) as upload:
+        result = build_map(log, settings, _bar(), upload.watch)
+        seconds = time.perf_counter() - began
+        if sys.stderr.isatty():
+            sys.stderr.write("\n")
+        stats = _write(arguments, log, settings, result, seconds)
+        uploaded = upload.finish(result.grid)
+    sys.stdout.write(
+        f"{stats['scans']} scans, {stats['processed']} processed in {seconds:.1f} s "
+        f"({stats['real_time_factor']:.0f} x real time), {stats['loops']} revisits -> {arguments.out}{uploaded}\n"
+    )
+    return 0
+
+
+def _write(
+    arguments: argparse.Namespace, log: Log, settings: Settings, result: Result, seconds: float
+) -> dict[str, float]:
+    """All files; what is in the statistics."""
     write_trajectory(arguments.out / "trajectory.txt", log.t, result.poses)
     write_map(arguments.out, result.grid, result.poses[result.keys])
     stats = _stats(log, settings, result, seconds)
     (arguments.out / "stats.json").write_text(json.dumps(stats, indent=2) + "\n")
     if arguments.log.name.removesuffix(".gz").endswith(".jsonl"):
         _write_result(arguments.out, log, result)
-    sys.stdout.write(
-        f"{stats['scans']} scans, {stats['processed']} processed in {seconds:.1f} s "
-        f"({stats['real_time_factor']:.0f} x real time), {stats['loops']} revisits -> {arguments.out}\n"
-    )
-    return 0
+    return stats
 
 
 def _stats(log: Log, settings: Settings, result: Result, seconds: float) -> dict[str, float]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tms_agents.commands.slam_log import add_log_options, make_folder, read, set_threads
+from tms_agents.commands.slam_log import add_log_options, make_folder, pose, read, set_threads
 from tms_agents.slam.export import map_picture, write_trajectory
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.known import MapError, known_map, read_npz
@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--map", required=True, metavar="MAP", help="folder, map.yaml of map_server, map.npz, or a map of the server"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for trajectory, estimates, stats and picture")
-    parser.add_argument("--start", type=_pose, metavar="X,Y,THETA", help="where it began, about (default: anywhere)")
+    parser.add_argument("--start", type=pose, metavar="X,Y,THETA", help="where it began, about (default: anywhere)")
     parser.add_argument("--particles", type=int, default=DEFAULTS.particles, metavar="N", help="at most")
     parser.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
     add_server_options(parser)
@@ -155,16 +155,6 @@ def _grid(arguments: argparse.Namespace) -> Grid:
         raise CommandError(f"{path}: {error}") from error
     except TownError as error:
         raise CommandError(str(error)) from error
-
-
-def _pose(text: str) -> tuple[float, float, float]:
-    try:
-        x, y, theta = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no pose like 1.5,0.2,1.57") from None
-    if not np.isfinite([x, y, theta]).all():
-        raise argparse.ArgumentTypeError(f"{text!r} is no pose like 1.5,0.2,1.57")
-    return x, y, theta
 
 
 def _bar() -> Callable[[int, int, Estimate], None]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numba
+import numpy as np
 
 from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
 from tms_client.cli import CommandError
@@ -50,3 +51,14 @@ def set_threads(wanted: int) -> None:
     if not 0 <= wanted <= cores:
         raise CommandError(f"--threads: from 1 to {cores}")
     numba.set_num_threads(wanted or cores)
+
+
+def pose(text: str) -> tuple[float, float, float]:
+    """An option like 1.5,0.2,1.57: x and y in m, theta in rad."""
+    try:
+        x, y, theta = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no pose like 1.5,0.2,1.57") from None
+    if not np.isfinite([x, y, theta]).all():
+        raise argparse.ArgumentTypeError(f"{text!r} is no pose like 1.5,0.2,1.57")
+    return x, y, theta

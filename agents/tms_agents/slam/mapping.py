@@ -44,8 +44,16 @@ class Result:
     backend_seconds: float
 
 
-def build_map(log: Log, settings: Settings, progress: Callable[[Progress], None] = lambda _: None) -> Result:
-    """The filter over all key scans, then loop closing over the best path, then the map of the final path."""
+def build_map(
+    log: Log,
+    settings: Settings,
+    progress: Callable[[Progress], None] = lambda _: None,
+    watch: Callable[[ParticleFilter], None] = lambda _: None,
+) -> Result:
+    """The filter over all key scans, then loop closing over the best path, then the map of the final path.
+
+    ``watch`` may look at the filter after each scan.
+    """
     keys = key_scans(log, settings.step_m, settings.step_rad)
     scans = [log.points(int(n)) for n in keys]
     began, began_cpu = time.perf_counter(), time.process_time()
@@ -55,6 +63,7 @@ def build_map(log: Log, settings: Settings, progress: Callable[[Progress], None]
         spent = max(1e-9, time.perf_counter() - began)
         real_time = float(log.t[n] - log.t[0]) / spent
         progress(Progress(k + 1, len(keys), len(particles.poses), particles.effective, real_time))
+        watch(particles)
     filtered_cpu = time.process_time()
     path, resamplings = particles.path(), particles.resamplings
     del particles  # its maps are as large as what follows

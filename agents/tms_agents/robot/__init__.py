@@ -1,0 +1,1 @@
+"""What a robot that maps sends to the server."""
