@@ -34,6 +34,7 @@ def main(argv: Sequence[str]) -> int:
     )
     _kind(kinds, "cabinet", "smart cabinet: boards with load cells or scales, and tag readers", _cabinet)
     _kind(kinds, "floor", "lasers over the floor: Hokuyo SCIP, SICK LMS2xx, TiM, LMS1xx, LMS5xx", _floor)
+    _kind(kinds, "robot", "a robot that maps while it drives: a recorded drive", _robot)
     arguments = parser.parse_args(argv)
     done: int = arguments.work(arguments)
     return done
@@ -81,6 +82,22 @@ def _floor(arguments: argparse.Namespace) -> int:
     config = read_config(arguments.config, FloorConfig)
     found = read_poses(config.calibration_path(arguments.config))
     _run(config, run_floor(config, {name: one.pose for name, one in found.items()}, drain_s=_STOP_S))
+    return 0
+
+
+def _robot(arguments: argparse.Namespace) -> int:
+    try:
+        from tms_agents.commands.slam_log import load
+        from tms_agents.robot.config import RobotConfig
+        from tms_agents.robot.runner import run as run_robot
+    except ImportError as error:
+        if error.name is None or error.name.startswith("tms_"):
+            raise
+        raise CommandError(f'the robot agent needs {error.name}: pip install "robot-town-tms[slam]"') from error
+
+    config = read_config(arguments.config, RobotConfig)
+    recorded = load(config.source.path, config.source.models)
+    _run(config, run_robot(config, recorded, drain_s=_STOP_S))
     return 0
 
 

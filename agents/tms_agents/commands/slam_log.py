@@ -23,17 +23,22 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
 
 
 def read(arguments: argparse.Namespace) -> Log:
-    """The log, with the laser where ``--models`` says. Raises ``CommandError``."""
+    """The log that the options name. Raises ``CommandError``."""
+    return load(arguments.log, arguments.models)
+
+
+def load(path: Path, models: Path | None) -> Log:
+    """A log, with the laser where ``models`` says. Raises ``CommandError``."""
     try:
-        log = read_log(arguments.log)
-        if arguments.models is not None:
-            log = replace(log, laser=parse_laser(arguments.models.read_text()))
+        log = read_log(path)
+        if models is not None:
+            log = replace(log, laser=parse_laser(models.read_text()))
     except OSError as error:
-        raise CommandError(f"{error.filename or arguments.log}: {error.strerror or error}") from error
+        raise CommandError(f"{error.filename or path}: {error.strerror or error}") from error
     except LogError as error:
-        raise CommandError(f"{arguments.log}: {error}") from error
+        raise CommandError(f"{path}: {error}") from error
     if log.bad_lines:
-        sys.stderr.write(f"{arguments.log}: {log.bad_lines} lines could not be read and were left out\n")
+        sys.stderr.write(f"{path}: {log.bad_lines} lines could not be read and were left out\n")
     return log
 
 

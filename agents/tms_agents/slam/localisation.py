@@ -194,8 +194,9 @@ class Localiser:
     def _look_for_rivals(self, best: Hypothesis, points: Floats) -> None:
         """Those that cannot be told from the best one get particles."""
         s = self.settings
-        tried, costs = self._tried(points, 1.0)
-        seen = list(self._seen)[: s.remembered if not self._verdict.localised else s.remembered // 2]
+        share = 0.4 if self._verdict.localised else 1.0  # a look now and then may miss what the next one finds
+        tried, costs = self._tried(points, share)
+        seen = list(self._seen)[: int(share * s.remembered)]
         rivals = rivals_of(
             best.pose, tried, costs, seen, self._known, self._coarse, self._laser, s.noise, s.fine_m, s.rivals
         )

@@ -66,7 +66,8 @@ def rivals_of(
 ) -> Rivals:
     """Of ``best`` (3,) among ``tried`` (N, 3) with ``costs`` (N,) of the newest of the scans ``seen`` (newest
     first)."""
-    order = np.argsort(costs, kind="stable")[: 50 * most]
+    best_of_all = np.argpartition(costs, 50 * most)[: 50 * most] if len(costs) > 50 * most else np.arange(len(costs))
+    order = best_of_all[np.argsort(costs[best_of_all], kind="stable")]
     _, first = np.unique(bins_of(tried[order], *_AROUND), axis=0, return_index=True)
     candidates = tried[order[np.sort(first)[:most]]]
     poses, costs_of_scans = _followed_back(
