@@ -115,7 +115,7 @@ def _write(folder: Path, log: Log, grid: Grid, found: Localised, stats: dict[str
             )
     (folder / "stats.json").write_text(json.dumps(stats, indent=2) + "\n")
     occupancy, origin, resolution = grid
-    path = found.poses[found.keys][np.array([one.localised for one in found.estimates])]
+    path = np.where(believed[found.keys, None], found.poses[found.keys], np.nan)
     Image.fromarray(map_picture(occupancy, origin, resolution, path)).save(folder / "localised.png")
 
 
@@ -129,11 +129,9 @@ def _sentence(found: Localised, stats: dict[str, object]) -> str:
             f"localised after {stats['converged_after_m']:.1f} m ({(first or 0) + 1} scans); in the end at {where}, "
             f"+- {last.best.spread_m:.2f} m; {processed}"
         )
-    before = "was localised for a while" if first is not None else "not localised"
-    return (
-        f"{before}; in the end the best of {len(last.hypotheses)} guesses is {where} "
-        f"({last.best.weight:.0%}); {processed}"
-    )
+    share = f"not in the end ({stats['share_of_scans_localised']:.0%} of the scans)"
+    before = "not localised" if first is None else f"localised after {stats['converged_after_m']:.1f} m, {share}"
+    return f"{before}; the best guess is {where} ({last.best.weight:.0%}); {processed}"
 
 
 def _grid(arguments: argparse.Namespace) -> Grid:

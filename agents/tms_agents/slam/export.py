@@ -53,9 +53,9 @@ def write_map(folder: Path, grid: GridMap, path: Floats) -> None:
 
 def map_picture(occupancy: Floats, origin: tuple[float, float], resolution: float, path: Floats) -> Bytes:
     """(H, W, 3) of ``occupancy`` (H, W; row 0 lowest, NaN unknown) with ``path`` (K, 2 or more), its first row on
-    top."""
+    top. Where ``path`` is NaN the pen is lifted."""
     picture = np.repeat(_trinary(occupancy)[:, :, None], 3, axis=2)
-    if len(path):
+    if np.isfinite(path).any():
         _draw(picture, (path[:, :2] - np.array(origin)) / resolution)
     return picture[::-1]
 
@@ -91,7 +91,9 @@ def _trinary(occupancy: Floats) -> Bytes:
 
 def _draw(picture: Bytes, cells: Floats) -> None:
     """The path ``cells`` (K, 2), a pixel wide, from blue to red."""
-    places = _places(cells)
+    lifted = np.flatnonzero(np.isnan(cells).any(axis=1))
+    runs = [run[np.isfinite(run).all(axis=1)] for run in np.split(cells, lifted)]
+    places = np.concatenate([_places(run) for run in runs if len(run)])
     share = np.linspace(0.0, 1.0, len(places))
     inside = ((places >= 0) & (places < np.array(picture.shape[1::-1]))).all(axis=1)
     colours = np.stack([255 * share, 0 * share + 60, 255 * (1 - share)], axis=-1).astype(np.uint8)

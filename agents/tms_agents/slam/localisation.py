@@ -92,6 +92,7 @@ class Localiser:
         self._odometry: Floats | None = None
         self._driven: Floats = np.zeros(2)
         self._scans = 0
+        self._told = settings.start is not None
         self._seen: deque[Seen] = deque(maxlen=settings.remembered)
 
     def process(self, odometry: Floats, driven: Floats, points: Floats) -> Estimate:
@@ -194,6 +195,10 @@ class Localiser:
     def _look_for_rivals(self, best: Hypothesis, points: Floats) -> None:
         """Those that cannot be told from the best one get particles."""
         s = self.settings
+        if self._told:  # who was told where it is need not look elsewhere, until it is lost
+            self._told = False
+            self._verdict.answer(np.inf, np.inf, 1.0)
+            return
         share = 0.4 if self._verdict.localised else 1.0  # a look now and then may miss what the next one finds
         tried, costs = self._tried(points, share)
         seen = list(self._seen)[: int(share * s.remembered)]

@@ -98,6 +98,44 @@ def test_compare_with_itself_and_with_relations(done, driven, capsys):
     assert said.startswith(f"{len(rows)} relations: 0.0")
 
 
+def localised(done, *arguments):
+    return slam.main(["localise", str(done / "drive.log"), "--particles", "5000", *arguments])
+
+
+def test_the_drive_is_localised_in_its_own_map(done, capsys, monkeypatch):
+    out = done / "found"
+    assert localised(done, "--map", str(done / "out"), "--out", str(out)) == 0
+    assert capsys.readouterr().out.startswith("localised after ")
+    stats = json.loads((out / "stats.json").read_text())
+    assert stats["localised"] and stats["converged_after_m"] > 1.5
+    assert stats["particles"]["first"] > 10 * stats["particles"]["last"]
+    believed, driven = read_trajectory(out / "trajectory.txt"), read_trajectory(done / "out" / "trajectory.txt")
+    assert 40 < len(believed) < 80
+    same = driven[np.searchsorted(driven[:, 0], believed[:, 0] - 1e-6)]
+    assert np.median(np.hypot(*(same - believed)[:, 1:3].T)) < 0.05
+    lines = (out / "estimates.txt").read_text().splitlines()[1:]
+    assert len(lines) == 80
+    assert sum(int(line.split()[4]) for line in lines) == len(believed)
+    assert (out / "localised.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("file", ["map.npz", "map.yaml", "map_raw.yaml"])
+def test_any_file_of_a_map_and_a_known_start(done, file, capsys):
+    assert localised(done, "--map", str(done / "out" / file), "--start", "0.1,0.1,0") == 0
+    assert float(capsys.readouterr().out.split()[2]) < 6.0
+
+
+def test_who_is_not_localised_is_told_so(done, capsys, tmp_path):
+    """A room of 4 m, empty, is another place than the building."""
+    room = np.pad(np.zeros((76, 76)), 2, constant_values=1.0)
+    np.savez(tmp_path / "map.npz", occupancy=room, origin=(0.0, 0.0), resolution=0.05)
+    out = tmp_path / "out"
+    assert localised(done, "--map", str(tmp_path / "map.npz"), "--out", str(out)) == 1
+    assert capsys.readouterr().out.startswith("not localised; the best guess is")
+    assert json.loads((out / "stats.json").read_text())["converged_after_m"] is None
+    assert (out / "trajectory.txt").read_text().count("\n") == 1
+
+
 def test_the_metric_is_that_of_the_definition():
     t = np.arange(60.0)
     path = np.column_stack([t, t, 0 * t, 0 * t])
@@ -121,12 +159,19 @@ def test_the_metric_is_that_of_the_definition():
         (["run", "drive.log", "--out", "o", "--models", "empty.log"], "models.json"),
         (["compare", "empty.log", "empty.log"], "empty.log"),
         (["compare", "missing", "missing"], "missing"),
+        (["localise", "drive.log", "--map", "nowhere.yaml"], "nowhere.yaml"),
+        (["localise", "drive.log", "--map", "empty.npz"], "empty.npz: no map"),
+        (["localise", "drive.log", "--map", "out", "--particles", "1"], "--particles"),
+        (["localise", "drive.log", "--map", "out", "--seed", "-1"], "--seed"),
+        (["localise", "missing.log", "--map", "out"], "missing.log: No such file"),
+        (["localise", "drive.log", "--map", "corridor", "--url", "http://127.0.0.1:1"], "127.0.0.1:1"),
     ],
 )
 def test_bad_input_is_one_clear_line(done, monkeypatch, arguments, why):
     monkeypatch.chdir(done)
     (done / "empty.log").write_text("")
     (done / "other.txt").write_text("x")
+    (done / "empty.npz").write_bytes(b"")
     with pytest.raises(CommandError, match=why) as raised:
         slam.main(arguments)
     assert "\n" not in str(raised.value)
