@@ -1,8 +1,9 @@
 """Localisation in known maps from anywhere: how often right, how soon, how often wrong; kidnapped robots; CPU time.
 
     python benchmarks/localise.py                              all worlds
-    python benchmarks/localise.py --worlds intel,csail-part    some of them
+    python benchmarks/localise.py --worlds intel,csail-part      some of them
     python benchmarks/localise.py --starts 20 --seeds 2
+    python benchmarks/localise.py --plain                      with settings like those of AMCL
 
 Maps are made by `tms_agents.slam.build_map`: of the whole log, or (`-part`) of its first half, and then the robot is
 put into the second half; what drives there is compared with the path of the whole log (logs) or the truth (simulated),
@@ -71,7 +72,7 @@ class Trial:
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--worlds", default=",".join(WORLDS), help="comma separated")
-    parser.add_argument("--starts", type=int, default=20, help="moments at which the robot is put into the map")
+    parser.add_argument("--starts", type=int, default=12, help="moments at which the robot is put into the map")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--plain", action="store_true", help="with settings like those of AMCL")
     args = parser.parse_args(arguments)
