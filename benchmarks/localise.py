@@ -30,7 +30,8 @@ from tms_agents.slam.fit import UNKNOWN, Fit
 from tms_agents.slam.geometry import Floats, between, compose, inverse
 from tms_agents.slam.keyframes import Indices, key_scans
 from tms_agents.slam.known import KnownMap, known_map
-from tms_agents.slam.localisation import Estimate, LocalisationSettings, Localiser
+from tms_agents.slam.localisation import Estimate, Localiser
+from tms_agents.slam.localisation_settings import LocalisationSettings
 from tms_agents.slam.logs_carmen import parse_carmen
 
 DATA = Path(os.environ.get("TMS_SHARED_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

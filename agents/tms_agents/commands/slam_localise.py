@@ -16,7 +16,8 @@ from tms_agents.commands.slam_log import add_log_options, make_folder, pose, rea
 from tms_agents.slam.export import map_picture, write_trajectory
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.known import MapError, known_map, read_npz
-from tms_agents.slam.localisation import Estimate, LocalisationSettings
+from tms_agents.slam.localisation import Estimate
+from tms_agents.slam.localisation_settings import LocalisationSettings
 from tms_agents.slam.localising import Localised, localise
 from tms_agents.slam.logs import Log
 from tms_client import Town

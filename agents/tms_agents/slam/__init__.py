@@ -3,7 +3,8 @@ map. No I/O to any server."""
 
 from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.known import MapError, known_map
-from tms_agents.slam.localisation import LocalisationSettings, Localiser
+from tms_agents.slam.localisation import Localiser
+from tms_agents.slam.localisation_settings import LocalisationSettings
 from tms_agents.slam.logs import Log, LogError, read_log
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings

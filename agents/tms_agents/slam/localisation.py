@@ -8,61 +8,22 @@ thrown over the map (augmented MCL; Thrun, Burgard, Fox 2005, section 8.3.7).
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from tms_agents.slam.anywhere import Anywhere
 from tms_agents.slam.filter import drawn, thinned
-from tms_agents.slam.fit import MEAN, Fit
+from tms_agents.slam.fit import Fit
 from tms_agents.slam.geometry import Floats, between, compose, wrapped
 from tms_agents.slam.hypotheses import Hypothesis, hypotheses
 from tms_agents.slam.known import KnownMap
-from tms_agents.slam.motion import OdometryNoise, turned
-from tms_agents.slam.rivals import Seen, rivals_of
-from tms_agents.slam.sampling import drawn_until_enough, everywhere
+from tms_agents.slam.localisation_settings import LocalisationSettings
+from tms_agents.slam.motion import turned
+from tms_agents.slam.rivals import Follower, Seen
 from tms_agents.slam.tracking import matched
-from tms_agents.slam.verdict import Limits, Verdict
+from tms_agents.slam.verdict import Verdict
 from tms_agents.slam.weights import effective_number, normalised
-
-
-@dataclass(frozen=True, slots=True)
-class LocalisationSettings:
-    """Lengths in m, angles in rad. ``start`` is the pose where the robot begins, about; None: anywhere."""
-
-    seed: int = 0
-    start: tuple[float, float, float] | None = None
-    start_m: float = 0.5
-    start_rad: float = 0.3
-    #: Particles: at most, at least, the error that KLD-sampling allows and its boxes.
-    particles: int = 20_000
-    least: int = 40
-    error: float = 0.1
-    bins: tuple[float, float] = (0.4, np.pi / 18)
-    #: Poses tried per m2 of free floor when the robot may be anywhere, and at most.
-    tries_per_m2: float = 600.0
-    most_tries: int = 2_000_000
-    #: While nothing is believed, this share of the belief goes to fresh particles at every so-manieth scan.
-    anew: float = 0.05
-    anew_every: int = 5
-    #: So many particles are matched one by one; where there are more, they are only weighed.
-    matched: int = 1500
-    #: Beams that are tried at first, weighed, and matched; all beams of a scan are worth so many witnesses.
-    few_beams: int = 30
-    beams: int = 60
-    witnesses: float = 10.0
-    #: A beam through a wall counts as one that misses.
-    through: bool = True
-    coarse_m: float = 0.2
-    fine_m: float = 0.1
-    #: Scans that are remembered to compare places by; places compared; share of the belief that goes to those that
-    #: cannot be told from the best one.
-    remembered: int = 24
-    rivals: int = 100
-    rivals_share: float = 0.3
-    noise: OdometryNoise = field(default_factory=OdometryNoise)
-    limits: Limits = field(default_factory=Limits)
-    step_m: float = 0.5
-    step_rad: float = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +46,9 @@ class Localiser:
         self.settings, self._known = settings, known
         self._laser = np.ascontiguousarray(laser[:2])
         self._random = np.random.default_rng(settings.seed)
-        self._coarse, self._fine = Fit(known, settings.coarse_m), Fit(known, settings.fine_m)
+        self._map = Anywhere(known, settings, self._laser, self._random)
+        self._fine = Fit(known, settings.fine_m)
+        self._follower = Follower(known, self._map.fit, self._laser, settings.noise, settings.fine_m)
         self._verdict = Verdict(settings.limits)
         self.poses: Floats = np.zeros((0, 3))
         self.log_weights: Floats = np.zeros(0)
@@ -123,12 +86,12 @@ class Localiser:
     def _begin(self, points: Floats) -> None:
         s = self.settings
         if s.start is None:
-            self.poses, self.log_weights = self._anywhere(points, 1.0)
+            self.poses, self.log_weights = self._map.particles(points, 1.0)
             return
         spread = np.array([s.start_m, s.start_m, s.start_rad])
         self.poses = np.array(s.start) + spread * self._random.standard_normal((s.matched, 3))
         self.poses[:, 2] = wrapped(self.poses[:, 2])
-        self.log_weights = self._weighed(self.poses, points)
+        self.log_weights = self._map.weighed(self.poses, points)
 
     def _share_anew(self) -> float:
         due = not self._verdict.localised and self._scans % self.settings.anew_every == 0
@@ -142,7 +105,7 @@ class Localiser:
         starts = priors + np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), normals[0])
         precision: Floats = np.linalg.inv(covariance).astype(np.float64)
         poses, hessians, volume = matched(self._known, few, starts, priors, precision, self.settings.fine_m)
-        self.log_weights = self.log_weights + volume + self._weighed(poses, points)
+        self.log_weights = self.log_weights + volume + self._map.weighed(poses, points)
         self.poses = poses + drawn(hessians, normals[1])
 
     def _move_and_weigh(self, motion: Floats, noise: Floats, points: Floats, share: float) -> None:
@@ -152,45 +115,15 @@ class Localiser:
         self.poses = moved + np.einsum(
             "nij,nj->ni", np.linalg.cholesky(covariance), self._random.standard_normal((n, 3))
         )
-        self.log_weights = self.log_weights + self._weighed(self.poses, points)
+        self.log_weights = self.log_weights + self._map.weighed(self.poses, points)
         if share > 0.0:
             self._throw(points, share)
 
     def _throw(self, points: Floats, share: float) -> None:
         """``share`` of the belief before this scan goes to fresh particles anywhere."""
-        fresh, weights = self._anywhere(points, max(share, 0.2))
+        fresh, weights = self._map.particles(points, max(share, 0.2))
         self.poses = np.concatenate([self.poses, fresh])
         self.log_weights = np.concatenate([self.log_weights + np.log(1.0 - share), weights + np.log(share)])
-
-    def _anywhere(self, points: Floats, effort: float) -> tuple[Floats, Floats]:
-        """Particles over all of the map, those drawn from many more that fit the scan; log weights in which all that
-        were tried had 1 together before the scan. ``effort`` 0..1 is the share of the work."""
-        s = self.settings
-        poses, costs = self._tried(points, effort)
-        weights = normalised(-s.witnesses * costs)
-        evidence = np.log(np.mean(np.exp(-s.witnesses * costs)))
-        parents = self._enough(poses, weights, int(effort * s.particles))
-        return self._near(poses[parents], costs[parents], points, evidence)
-
-    def _tried(self, points: Floats, effort: float) -> tuple[Floats, Floats]:
-        """Poses over all of the map and their costs."""
-        s, known = self.settings, self._known
-        tries = int(effort * np.clip(s.tries_per_m2 * known.free_m2, s.particles, s.most_tries))
-        poses = everywhere(known, tries, self._random)
-        return poses, self._coarse(poses, thinned(points, s.few_beams), self._laser, through=False)[:, MEAN]
-
-    def _near(self, poses: Floats, costs: Floats, points: Floats, evidence: float) -> tuple[Floats, Floats]:
-        """Each stands for the places around it: moved within them to a better fit."""
-        s, n = self.settings, len(poses)
-        spread = np.array([0.1, 0.1, 0.06])
-        moved = poses + spread * self._random.standard_normal((n, 3))
-        weights = self._weighed(moved, points) + s.witnesses * costs + evidence - np.log(n)
-        return moved, weights
-
-    def _weighed(self, poses: Floats, points: Floats) -> Floats:
-        s = self.settings
-        fits = self._coarse(poses, thinned(points, s.beams), self._laser, through=s.through)
-        return -s.witnesses * fits[:, MEAN]
 
     def _look_for_rivals(self, best: Hypothesis, points: Floats) -> None:
         """Those that cannot be told from the best one get particles."""
@@ -200,11 +133,9 @@ class Localiser:
             self._verdict.answer(np.inf, np.inf, 1.0)
             return
         share = 0.4 if self._verdict.localised else 1.0  # a look now and then may miss what the next one finds
-        tried, costs = self._tried(points, share)
+        tried, costs = self._map.tried(points, share)
         seen = list(self._seen)[: int(share * s.remembered)]
-        rivals = rivals_of(
-            best.pose, tried, costs, seen, self._known, self._coarse, self._laser, s.noise, s.fine_m, s.rivals
-        )
+        rivals = self._follower.rivals_of(best.pose, tried, costs, seen, s.rivals)
         self._verdict.answer(rivals.margin, rivals.sigmas, len(seen) / s.remembered)
         if self._verdict.localised:
             return
@@ -216,12 +147,6 @@ class Localiser:
             kept = np.log(1.0 - s.rivals_share) + np.log(np.maximum(normalised(self.log_weights), 1e-300))
             self.poses, self.log_weights = np.concatenate([self.poses, fresh]), np.concatenate([kept, weights])
 
-    def _enough(self, poses: Floats, weights: Floats, most: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-        s = self.settings
-        return drawn_until_enough(
-            poses, weights, least=s.least, most=max(s.least, most), error=s.error, bins=s.bins, random=self._random
-        )
-
     def _resample(self) -> None:
         weights = normalised(self.log_weights)
         crowded = len(self.poses) > 2 * self.settings.least
@@ -229,6 +154,6 @@ class Localiser:
             self.log_weights = np.log(np.maximum(weights, 1e-300))
             return
         most = min(self.settings.particles, max(1000, 4 * len(self.poses)))
-        parents = self._enough(self.poses, weights, most)
+        parents = self._map.enough(self.poses, weights, most)
         self.poses = self.poses[parents]
         self.log_weights = np.full(len(parents), -np.log(len(parents)))

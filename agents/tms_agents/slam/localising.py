@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tms_agents.slam.geometry import Floats, between, compose
 from tms_agents.slam.keyframes import Indices, key_scans
 from tms_agents.slam.known import KnownMap
-from tms_agents.slam.localisation import Estimate, LocalisationSettings, Localiser
+from tms_agents.slam.localisation import Estimate, Localiser
+from tms_agents.slam.localisation_settings import LocalisationSettings
 from tms_agents.slam.logs import Log
 
 

@@ -52,57 +52,46 @@ class Rivals:
         return float((self.behind / np.maximum(self.errors, 1e-9)).min(initial=np.inf))
 
 
-def rivals_of(
-    best: Floats,
-    tried: Floats,
-    costs: Floats,
-    seen: Sequence[Seen],
-    known: KnownMap,
-    fit: Fit,
-    laser: Floats,
-    noise: OdometryNoise,
-    sigma_m: float,
-    most: int,
-) -> Rivals:
-    """Of ``best`` (3,) among ``tried`` (N, 3) with ``costs`` (N,) of the newest of the scans ``seen`` (newest
-    first)."""
-    best_of_all = np.argpartition(costs, 50 * most)[: 50 * most] if len(costs) > 50 * most else np.arange(len(costs))
-    order = best_of_all[np.argsort(costs[best_of_all], kind="stable")]
-    _, first = np.unique(bins_of(tried[order], *_AROUND), axis=0, return_index=True)
-    candidates = tried[order[np.sort(first)[:most]]]
-    poses, costs_of_scans = _followed_back(
-        np.concatenate([best[None], candidates]), seen, known, fit, laser, noise, sigma_m
-    )
-    apart = between(poses[:1], poses)
-    others = np.flatnonzero((np.hypot(apart[:, 0], apart[:, 1]) > _APART[0]) | (np.abs(apart[:, 2]) > _APART[1]))
-    behind = (costs_of_scans - costs_of_scans[:, :1])[:, others]
-    order = np.argsort(behind.mean(axis=0), kind="stable")
-    error = behind.std(axis=0) / np.sqrt(max(1, len(seen) - 1))
-    return Rivals(poses[others[order]], behind.mean(axis=0)[order], error[order])
+@dataclass(frozen=True, slots=True, eq=False)
+class Follower:
+    """Follows poses back through scans in ``known``: ``fit`` tells how well they fit, the matcher's kernel is
+    ``sigma_m`` wide, the laser is at ``laser`` (2,) on the robot."""
 
+    known: KnownMap
+    fit: Fit
+    laser: Floats
+    noise: OdometryNoise
+    sigma_m: float
 
-def _followed_back(
-    poses: Floats,
-    seen: Sequence[Seen],
-    known: KnownMap,
-    fit: Fit,
-    laser: Floats,
-    noise: OdometryNoise,
-    sigma_m: float,
-) -> tuple[Floats, Floats]:
-    """Where each of ``poses`` (N, 3) fits the newest scan best, and the mean costs per beam (S, N) of all scans."""
-    n = len(poses)
-    spread = np.diag([_AROUND[0] ** 2, _AROUND[0] ** 2, _AROUND[1] ** 2])
-    motion, covariance = np.zeros(3), np.broadcast_to(spread, (n, 3, 3))
-    newest, costs = poses, np.zeros((len(seen), n))
-    for number, scan in enumerate(seen):
-        if number:
-            before = seen[number - 1]
-            motion = between(before.odometry, scan.odometry)
-            covariance = turned(noise.covariance(motion, before.driven - scan.driven), poses[:, 2])
-        priors = compose(poses, np.broadcast_to(motion, (n, 3)))
-        precision = np.ascontiguousarray(np.linalg.inv(covariance))
-        poses, _, _ = matched(known, scan.points, priors, priors, precision, sigma_m)
-        costs[number] = fit(poses, scan.points, laser)[:, MEAN]
-        newest = newest if number else poses
-    return newest, costs
+    def rivals_of(self, best: Floats, tried: Floats, costs: Floats, seen: Sequence[Seen], most: int) -> Rivals:
+        """Of ``best`` (3,) among ``tried`` (N, 3) with ``costs`` (N,) of the newest of the scans ``seen`` (newest
+        first), ``most`` of which are followed."""
+        lowest = np.argpartition(costs, 50 * most)[: 50 * most] if len(costs) > 50 * most else np.arange(len(costs))
+        order = lowest[np.argsort(costs[lowest], kind="stable")]
+        _, first = np.unique(bins_of(tried[order], *_AROUND), axis=0, return_index=True)
+        candidates = tried[order[np.sort(first)[:most]]]
+        poses, mean = self._back(np.concatenate([best[None], candidates]), seen)
+        apart = between(poses[:1], poses)
+        others = np.flatnonzero((np.hypot(apart[:, 0], apart[:, 1]) > _APART[0]) | (np.abs(apart[:, 2]) > _APART[1]))
+        behind = (mean - mean[:, :1])[:, others]
+        order = np.argsort(behind.mean(axis=0), kind="stable")
+        error = behind.std(axis=0) / np.sqrt(max(1, len(seen) - 1))
+        return Rivals(poses[others[order]], behind.mean(axis=0)[order], error[order])
+
+    def _back(self, poses: Floats, seen: Sequence[Seen]) -> tuple[Floats, Floats]:
+        """Where each of ``poses`` (N, 3) fits the newest scan best, and its mean costs per beam (S, N) of all scans."""
+        n = len(poses)
+        spread = np.diag([_AROUND[0] ** 2, _AROUND[0] ** 2, _AROUND[1] ** 2])
+        motion, covariance = np.zeros(3), np.broadcast_to(spread, (n, 3, 3))
+        newest, costs = poses, np.zeros((len(seen), n))
+        for number, scan in enumerate(seen):
+            if number:
+                before = seen[number - 1]
+                motion = between(before.odometry, scan.odometry)
+                covariance = turned(self.noise.covariance(motion, before.driven - scan.driven), poses[:, 2])
+            priors = compose(poses, np.broadcast_to(motion, (n, 3)))
+            precision = np.ascontiguousarray(np.linalg.inv(covariance))
+            poses, _, _ = matched(self.known, scan.points, priors, priors, precision, self.sigma_m)
+            costs[number] = self.fit(poses, scan.points, self.laser)[:, MEAN]
+            newest = newest if number else poses
+        return newest, costs

@@ -10,7 +10,8 @@ from tms_agents.simulation.building import Drive, carmen, drive
 from tms_agents.slam import Settings, build_map
 from tms_agents.slam.geometry import between, compose
 from tms_agents.slam.known import KnownMap, known_map
-from tms_agents.slam.localisation import LocalisationSettings, Localiser
+from tms_agents.slam.localisation import Localiser
+from tms_agents.slam.localisation_settings import LocalisationSettings
 from tms_agents.slam.localising import localise
 from tms_agents.slam.logs_carmen import parse_carmen
 
