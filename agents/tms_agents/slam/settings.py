@@ -33,3 +33,7 @@ class Settings:
     #: Loop closing: a submap every so many metres (or rad turned).
     submap_m: float = 8.0
     submap_rad: float = 6.0
+    #: Light: cells of its map, at most so many beams are matched, and how many of them are worth one witness.
+    light_m: float = 0.025
+    light_beams: int = 360
+    light_temperature: float = 4.0
