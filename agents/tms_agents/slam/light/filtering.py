@@ -35,8 +35,8 @@ class ParticleLight:
         s, tiles = self._settings, self.maps.tiles
         beams = as_beams(scan.thinned(s.light_beams))
         match_light_all(
-            maps.distance.directory, maps.distance.cells, maps.metres, maps.frame, points, tiles.directory,
-            tiles.cells, self.maps.frame, beams, priors, precision, s.sigma_m, s.temperature, s.light_temperature,
+            maps.distance.directory, maps.distance.cells, maps.metres, maps.frame, points,
+            maps.occupancy.directory, maps.occupancy.cells, tiles.directory, tiles.cells, self.maps.frame, beams, priors, precision, s.sigma_m, s.temperature, s.light_temperature,
             poses, hessians, results,
         )  # fmt: skip
 
