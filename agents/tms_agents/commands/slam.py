@@ -16,6 +16,7 @@ import numpy as np
 
 from tms_agents.commands.slam_compare import compare
 from tms_agents.slam.export import write_map, write_trajectory
+from tms_agents.slam.light.scans import LightError
 from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings
@@ -34,6 +35,7 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument("--particles", type=int, default=DEFAULTS.particles, metavar="N")
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
+    run.add_argument("--intensity", action="store_true", help="use received light; writes imap.npy and imap.png, too")
     run.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
     run.set_defaults(work=_run)
     other = kinds.add_parser("compare", help="two results, or one with known relations")
@@ -66,12 +68,15 @@ def _run(arguments: argparse.Namespace) -> int:
     numba.set_num_threads(arguments.threads or cores)
     settings = Settings(particles=arguments.particles, resolution=arguments.resolution, seed=arguments.seed)
     began = time.perf_counter()
-    result = build_map(log, settings, _bar())
+    try:
+        result = build_map(log, settings, _bar(), light=arguments.intensity)
+    except LightError as error:
+        raise CommandError(f"{arguments.log}: {error}; --intensity needs it") from error
     seconds = time.perf_counter() - began
     if sys.stderr.isatty():
         sys.stderr.write("\n")
     write_trajectory(arguments.out / "trajectory.txt", log.t, result.poses)
-    write_map(arguments.out, result.grid, result.poses[result.keys])
+    write_map(arguments.out, result.grid, result.poses[result.keys], result.light)
     stats = _stats(log, settings, result, seconds)
     (arguments.out / "stats.json").write_text(json.dumps(stats, indent=2) + "\n")
     if arguments.log.name.removesuffix(".gz").endswith(".jsonl"):
@@ -99,7 +104,7 @@ def _log(arguments: argparse.Namespace) -> Log:
 
 def _stats(log: Log, settings: Settings, result: Result, seconds: float) -> dict[str, float]:
     span = float(log.t[-1] - log.t[0])
-    return {
+    stats = {
         "scans": len(log),
         "processed": len(result.keys),
         "bad_lines": log.bad_lines,
@@ -117,14 +122,17 @@ def _stats(log: Log, settings: Settings, result: Result, seconds: float) -> dict
         "moved_by_loops_m": result.closed.moved,
         "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
+    return stats if result.contrast is None else {**stats, "light_contrast": result.contrast}
 
 
 def _write_result(folder: Path, log: Log, result: Result) -> None:
     """For recordings with a known truth: trajectory and map in one JSON file."""
-    document = {
+    document: dict[str, object] = {
         "trajectory": np.column_stack([log.t, result.poses]).tolist(),
         "map": {"file": "map.npy", "resolution": result.grid.resolution, "origin": list(result.grid.origin)},
     }
+    if result.light is not None:
+        document["intensity_map"] = {"file": "imap.npy"}
     (folder / "result.json").write_text(json.dumps(document))
 
 

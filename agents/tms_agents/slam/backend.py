@@ -9,6 +9,8 @@ import numpy as np
 
 from tms_agents.slam.closures import Closure, consistent, find_closure
 from tms_agents.slam.geometry import Floats, between, wrapped
+from tms_agents.slam.light.filtering import add_light
+from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.matching import linearise
 from tms_agents.slam.mending import mended
 from tms_agents.slam.posegraph import Edges, Indices, optimise
@@ -47,14 +49,16 @@ def close_loops(
     scans: Sequence[Floats],
     laser: Floats,
     settings: Settings,
+    lights: Sequence[LightScan] | None = None,
 ) -> Closed:
-    """``path``, ``odometry`` (K, 3), ``driven`` (K, 2) and ``scans`` of the key scans, ``laser`` (2,)."""
+    """``path``, ``odometry`` (K, 3), ``driven`` (K, 2), ``scans`` and perhaps ``lights`` of the key scans, ``laser``
+    (2,)."""
     again = mended(path, odometry, driven, scans, laser, settings)
-    closed = _closed(path, odometry, driven, scans, laser, settings)
+    closed = _closed(path, odometry, driven, scans, laser, settings, lights)
     if np.allclose(again, path, atol=1e-6):
         return closed
     # Whether a jump of the filter was right is seen best by how many revisits fit in then.
-    other = _closed(again, odometry, driven, scans, laser, settings)
+    other = _closed(again, odometry, driven, scans, laser, settings, lights)
     if other.believed - other.rejected <= closed.believed - closed.rejected:
         return closed
     return replace(other, moved=float(np.hypot(*(other.path - path)[:, :2].T).max()))
@@ -67,11 +71,12 @@ def _closed(
     scans: Sequence[Floats],
     laser: Floats,
     settings: Settings,
+    lights: Sequence[LightScan] | None,
 ) -> Closed:
     """Round by round, from one path."""
     way = driven[:, 0] - driven[0, 0]
     laser = np.ascontiguousarray(laser)
-    submaps = Submaps(path, driven, scans, laser, settings)
+    submaps = Submaps(path, driven, scans, laser, settings, lights)
     chain = _chain(submaps, odometry, driven, scans, settings)
     drift = Drift(path, chain)
     found, believed, rejected = path, 0, 0
@@ -180,6 +185,8 @@ def _chain(submaps: Submaps, odometry: Floats, driven: Floats, scans: Sequence[F
             maps.distance.directory[0], maps.distance.cells, maps.metres, maps.frame, scans[k], pose, pose,
             prior * _WITNESSES, settings.sigma_m, 1.0, hessian, gradient, result,
         )  # fmt: skip
+        if submap.light is not None and submaps.lights is not None:
+            add_light(submap.light, submaps.lights[k], pose, settings, hessian)
         covariance = turned.T @ np.linalg.inv(hessian) @ turned * _WITNESSES + np.diag(np.square(_FLOOR))
         information[k - 1] = np.linalg.inv(covariance)
     keys = np.arange(len(path))

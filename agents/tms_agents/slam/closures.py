@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tms_agents.slam.agreement import agreement
 from tms_agents.slam.branch_and_bound import best_pose
 from tms_agents.slam.geometry import Floats, between, compose, inverse, wrapped
+from tms_agents.slam.light.closures import placed_by_light
 from tms_agents.slam.matching import SHARE, match
 from tms_agents.slam.submaps import Submap, Submaps
 
@@ -58,6 +59,12 @@ def find_closure(
     if there is None:
         return None
     pose, hessian, fit = there
+    if submap.light is not None and submaps.lights is not None:
+        beams = submaps.light_cloud(submaps.lights, key, _AROUND)
+        placed = placed_by_light(submap.maps, submap.light, cloud, beams, pose, hessian, window, submaps.light_temperature)
+        if placed is None or not _agrees(submap, cloud, placed[0])[0]:
+            return None
+        pose, hessian = placed
     covariance = np.linalg.inv(hessian) * _WITNESSES + np.diag(np.square(_FLOOR))
     shift = float(np.hypot(*(pose - thought)[:2]))
     return Closure(submap.anchor, key, pose, np.linalg.inv(covariance), fit, shift)
@@ -74,13 +81,19 @@ def _refined(submap: Submap, cloud: Floats, start: Floats) -> tuple[Floats, Floa
     )  # fmt: skip
     if result[SHARE] < _KNOWN * _FITS:
         return None
+    agrees, fit = _agrees(submap, cloud, pose)
+    return (pose, hessian, fit) if agrees else None
+
+
+def _agrees(submap: Submap, cloud: Floats, pose: Floats) -> tuple[bool, float]:
+    """(Whether the match holds at ``pose``, share that fits)."""
+    maps = submap.maps
     near, free = agreement(
         maps.occupancy.directory[0], maps.occupancy.cells, maps.distance.directory[0], maps.distance.cells,
         maps.metres, maps.frame, cloud, pose, _NEAR_M,
     )  # fmt: skip
-    if near < _FITS * (near + free) or near + free < _KNOWN * len(cloud):
-        return None
-    return pose, hessian, near / (near + free)
+    holds = near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud)
+    return holds, near / max(1, near + free)
 
 
 def consistent(closures: list[Closure], path: Floats, way: Floats) -> NDArray[np.bool_]:

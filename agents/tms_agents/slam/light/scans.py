@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tms_agents.slam.geometry import Floats
+from tms_agents.slam.geometry import Floats, transform
 from tms_agents.slam.keyframes import Indices
 from tms_agents.slam.light.calibration import Calibration, learn
 from tms_agents.slam.light.surfaces import surfaces
-from tms_agents.slam.logs import Log
+from tms_agents.slam.logs import Log, LogError
 
 #: The calibration is learnt from at most so many scans, evenly chosen.
 _LEARNT_FROM = 400
@@ -35,18 +35,31 @@ class LightScan:
         return LightScan(self.points[chosen], self.tangents[chosen], self.light[chosen], self.deviation[chosen])
 
 
+class LightError(LogError):
+    """The log holds no light that could be used; the text says why in one line."""
+
+
+def contrast(scans: Sequence[LightScan]) -> float:
+    """How many times more the light of all beams scatters than by its noise: 1 where all surfaces are alike."""
+    light, deviation = (np.concatenate([getattr(s, name) for s in scans]) for name in ("light", "deviation"))
+    return float(np.std(light) / np.sqrt(np.mean(np.square(deviation)))) if len(light) else 0.0
+
+
 def calibrated(log: Log) -> Calibration:
     """What the whole log says of the laser.
 
     Raises:
-        ValueError: the log holds no intensity, or too little.
+        LightError: the log holds no intensity, or too little.
     """
     if log.intensities is None:
-        raise ValueError("the log holds no intensities")
+        raise LightError("it holds no received light intensity")
     every = max(1, len(log) // _LEARNT_FROM)
     parts = [_beams(log, n) for n in range(0, len(log), every)]
     ranges, incidence, intensities = (np.concatenate(column) for column in zip(*((a, c, d) for a, _, c, d, _ in parts), strict=True))
-    return learn(ranges, incidence, intensities)
+    try:
+        return learn(ranges, incidence, intensities)
+    except ValueError as error:
+        raise LightError(f"its light cannot be used: {error}") from error
 
 
 def light_scans(log: Log, keys: Indices, calibration: Calibration) -> Sequence[LightScan]:
@@ -58,6 +71,17 @@ def light_scans(log: Log, keys: Indices, calibration: Calibration) -> Sequence[L
         usable = np.isfinite(light)
         found.append(LightScan(points[usable], tangents[usable], light[usable], deviation[usable]))
     return found
+
+
+def merged(scans: list[LightScan], poses: Floats) -> LightScan:
+    """One cloud of ``scans`` seen from ``poses`` (K, 3)."""
+    turned = poses * np.array([0.0, 0.0, 1.0])
+    return LightScan(
+        np.concatenate([transform(p, s.points) for p, s in zip(poses, scans, strict=True)]),
+        np.concatenate([transform(p, s.tangents) for p, s in zip(turned, scans, strict=True)]),
+        np.concatenate([s.light for s in scans]),
+        np.concatenate([s.deviation for s in scans]),
+    )
 
 
 def _beams(log: Log, n: int) -> tuple[Floats, Floats, Floats, Floats, Floats]:
