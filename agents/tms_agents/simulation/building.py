@@ -108,7 +108,7 @@ def drive(plan: str, how: Drive) -> Driven:
     corners, corridors, way = PLANS[plan]
     points = np.array(corners, dtype=np.float64)
     walls = edges(_rectangles(points, corridors, how, random))
-    fine = _path(points[way], how, random)
+    fine = path_through(points[way], random)
     truth, odometry = _rolled(fine, how, random)
     angles = -np.pi / 2 + np.pi / 180 * np.arange(180.0)
     shapes = _shapes(walls)
@@ -175,7 +175,7 @@ def _beside(middle: float, half: float, edge: float, deep: float, along: int) ->
     return near, middle - half, far, middle + half
 
 
-def _path(corners: Floats, how: Drive, random: np.random.Generator) -> Floats:
+def path_through(corners: Floats, random: np.random.Generator) -> Floats:
     """(F, 3) poses every few centimetres, corners cut, weaving a little; where the way turns back, on the spot."""
     pieces = [corners[:1]]
     for a, b in itertools.pairwise(corners):

@@ -34,6 +34,6 @@ class Settings:
     submap_m: float = 8.0
     submap_rad: float = 6.0
     #: Light: cells of its map, at most so many beams are matched, and how many of them are worth one witness.
-    light_m: float = 0.025
+    light_m: float = 0.05
     light_beams: int = 360
-    light_temperature: float = 4.0
+    light_temperature: float = 1.5

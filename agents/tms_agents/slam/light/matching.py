@@ -26,7 +26,7 @@ _FLOOR = 0.06
 #: Residuals beyond so many deviations pull less.
 _WIDTH = 2.0
 #: A place is known if its precision is that of so many beams; a slope has to be so many deviations of its noise.
-_KNOWN, _CLEARLY = 1.0, 3.0
+_KNOWN, _CLEARLY = 0.5, 1.5
 #: And steeper than this, log intensity per m: the rest of what the calibration did not explain changes slowly.
 _STEEP = 0.6
 #: So many cells from a surface on, what lies behind it is another one if the map knows nothing there.
