@@ -16,13 +16,15 @@ import numpy as np
 
 from tms_agents.commands.slam_compare import compare
 from tms_agents.slam.export import write_map, write_trajectory
+from tms_agents.slam.light.compared import build_compared
+from tms_agents.slam.light.paper import PaperSettings
 from tms_agents.slam.light.scans import LightError
 from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings
 from tms_client.cli import ArgumentParser, CommandError
 
-DEFAULTS = Settings()
+DEFAULTS, PAPER = Settings(), PaperSettings()
 
 
 def main(argv: Sequence[str]) -> int:
@@ -32,10 +34,16 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument("log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl; each may be .gz")
     run.add_argument("--out", type=Path, required=True, metavar="DIR")
     run.add_argument("--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)")
-    run.add_argument("--particles", type=int, default=DEFAULTS.particles, metavar="N")
+    run.add_argument("--particles", type=int, metavar="N", help=f"default: {DEFAULTS.particles} (paper: {PAPER.particles})")
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
     run.add_argument("--intensity", action="store_true", help="use received light; writes imap.npy and imap.png, too")
+    run.add_argument(
+        "--method",
+        choices=("filter", "paper", "icp"),
+        default="filter",
+        help="to compare with: the paper's particle filter (always with light), scan by scan (with --intensity: Intensity-ICP)",
+    )
     run.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
     run.set_defaults(work=_run)
     other = kinds.add_parser("compare", help="two results, or one with known relations")
@@ -51,6 +59,8 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    if arguments.particles is None:
+        arguments.particles = PAPER.particles if arguments.method == "paper" else DEFAULTS.particles
     if not 1 <= arguments.particles <= 10_000:
         raise CommandError("--particles: from 1 to 10000")
     if not 0.01 <= arguments.resolution <= 0.5:
@@ -69,9 +79,13 @@ def _run(arguments: argparse.Namespace) -> int:
     settings = Settings(particles=arguments.particles, resolution=arguments.resolution, seed=arguments.seed)
     began = time.perf_counter()
     try:
-        result = build_map(log, settings, _bar(), light=arguments.intensity)
+        if arguments.method == "filter":
+            result = build_map(log, settings, _bar(), light=arguments.intensity)
+        else:
+            result = build_compared(log, settings, _bar(), method=arguments.method, light=arguments.intensity)
     except LightError as error:
-        raise CommandError(f"{arguments.log}: {error}; --intensity needs it") from error
+        option = "--method paper" if arguments.method == "paper" else "--intensity"
+        raise CommandError(f"{arguments.log}: {error}; {option} needs it") from error
     seconds = time.perf_counter() - began
     if sys.stderr.isatty():
         sys.stderr.write("\n")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tms_agents.slam.distance import LARGEST_RADIUS, disc, mark_discs, update_distances
@@ -65,15 +67,22 @@ class Maps:
 
     def _include(self, lowest: Floats, highest: Floats) -> None:
         """The rectangle grows, with a margin, until both corners (m) and the reach of their fields are inside."""
-        span = SIDE * self.resolution
         edge = (self.radius + 1) * self.resolution
-        height, width = self.occupancy.directory.shape[1:]
-        below = np.ceil((self.frame[:2] - (lowest - edge)) / span).astype(int)
-        above = np.ceil((highest + edge - self.frame[:2]) / span).astype(int) - np.array([width, height])
-        if (below <= 0).all() and (above <= 0).all():
-            return
-        left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
-        right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
-        self.occupancy.extend(bottom, left, top, right)
-        self.distance.extend(bottom, left, top, right)
-        self.frame = self.frame - np.array([left * span, bottom * span, 0.0])
+        self.frame = grown([self.occupancy, self.distance], self.frame, self.resolution, lowest - edge, highest + edge)
+
+
+def grown(
+    tiles: Sequence[TiledMaps], frame: Floats, resolution: float, lowest: Floats, highest: Floats
+) -> Floats:
+    """``frame`` after all ``tiles``, which share it, have grown with a margin until both corners (m) are inside."""
+    span = SIDE * resolution
+    height, width = tiles[0].directory.shape[1:]
+    below = np.ceil((frame[:2] - lowest) / span).astype(int)
+    above = np.ceil((highest - frame[:2]) / span).astype(int) - np.array([width, height])
+    if (below <= 0).all() and (above <= 0).all():
+        return frame
+    left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
+    right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
+    for each in tiles:
+        each.extend(bottom, left, top, right)
+    return frame - np.array([left * span, bottom * span, 0.0])

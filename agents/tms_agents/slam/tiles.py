@@ -1,7 +1,7 @@
 """Many maps that share their tiles until one of them writes: copy-on-write in plain arrays, for the kernels.
 
-A tile is 32 x 32 cells (bytes, where nothing else is said). Every map has a directory of tile numbers over the same rectangle; tile 0 is the blank tile,
-which all maps share and nobody writes. Kernels write only to tiles that ``make_writable`` has given to their map
+A tile is 32 x 32 cells (bytes, where nothing else is said). Every map has a directory of tile numbers over the same
+rectangle; tile 0 is the blank tile, which all maps share and nobody writes. Kernels write only to tiles that ``make_writable`` has given to their map
 alone, so maps can be written side by side, and what they hold does not depend on the number of threads.
 """
 
@@ -30,7 +30,7 @@ class TiledMaps:
     """
 
     def __init__(
-        self, maps: int, blank: int, height: int, width: int, *, layers: int = 1, dtype: type[np.generic] = np.uint8
+        self, maps: int, blank: float, height: int, width: int, *, layers: int = 1, dtype: type[np.generic] = np.uint8
     ) -> None:
         self.directory: Ints = np.zeros((maps, height, width), dtype=np.int32)
         self.cells: Cells = np.full((64, layers * _CELLS), blank, dtype=dtype)
@@ -92,7 +92,7 @@ class TiledMaps:
 
 @njit(cache=True)
 def _make_writable(
-    directory: Ints, cells: Cells, references: Ints, free: Ints, unused: int, wanted: Ints, counts: Ints, blank: int
+    directory: Ints, cells: Cells, references: Ints, free: Ints, unused: int, wanted: Ints, counts: Ints, blank: float
 ) -> int:
     for n in range(len(counts)):
         for k in range(counts[n]):

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Bytes, Floats, Ints
 from tms_agents.slam.light.scans import LightScan
+from tms_agents.slam.maps import grown
 from tms_agents.slam.tiles import MASK, SHIFT, SIDE, TiledMaps
 
 Singles = NDArray[np.float32]
 LAYERS = 2
 _PLANE = SIDE * SIDE
-_MARGIN_TILES = 4
 #: The Gaussian: its deviation and reach in cells.
 _SMOOTH, _REACH = 0.9, 2
 
@@ -39,12 +39,14 @@ class LightMaps:
         if not len(scan.points):
             return
         reach = float(np.hypot(scan.points[:, 0], scan.points[:, 1]).max())
-        self._include(poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
+        reach += (_REACH + 2) * self.resolution
+        lowest, highest = poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach
+        self.frame = grown([self.tiles], self.frame, self.resolution, lowest, highest)
         n, height, width = self.tiles.directory.shape
         seen: Bytes = np.zeros((n, height * width), dtype=np.uint8)
         wanted: Ints = np.empty((n, min(height * width, len(scan.points))), dtype=np.int32)
         counts: Ints = np.empty(n, dtype=np.int32)
-        _mark_points(width, poses, scan.points, self.frame, seen, wanted, counts)
+        mark_points(width, poses, scan.points, self.frame, seen, wanted, counts)
         self.tiles.make_writable(wanted, counts)
         precision = 1.0 / np.square(scan.deviation)
         _write_points(self.tiles.directory, self.tiles.cells, poses, scan.points, scan.light, precision, self.frame)
@@ -52,18 +54,6 @@ class LightMaps:
     def resample(self, parents: Ints) -> None:
         """Map n becomes what map ``parents[n]`` was."""
         self.tiles.resample(parents)
-
-    def _include(self, lowest: Floats, highest: Floats) -> None:
-        span = SIDE * self.resolution
-        edge = (_REACH + 2) * self.resolution
-        height, width = self.tiles.directory.shape[1:]
-        below = np.ceil((self.frame[:2] - (lowest - edge)) / span).astype(int)
-        above = np.ceil((highest + edge - self.frame[:2]) / span).astype(int) - np.array([width, height])
-        left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
-        right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
-        if left or bottom or right or top:
-            self.tiles.extend(bottom, left, top, right)
-            self.frame = self.frame - np.array([left * span, bottom * span, 0.0])
 
 
 @njit(cache=True, inline="always")
@@ -75,7 +65,7 @@ def _cell(pose: Floats, cosine: float, sine: float, x: float, y: float, frame: F
 
 
 @njit(cache=True, parallel=True)
-def _mark_points(
+def mark_points(
     width: int, poses: Floats, points: Floats, frame: Floats, seen: Bytes, wanted: Ints, counts: Ints
 ) -> None:
     """Numbers of the tiles in which points end, each once."""
