@@ -20,8 +20,8 @@ from tms_agents.slam.logs import Log
 from tms_agents.slam.mapping import Progress, Result
 from tms_agents.slam.settings import Settings
 
-#: alpha of Intensity-ICP: m^2 for a difference of light as large as its median.
-ICP_ALPHA = 0.02
+#: alpha of Intensity-ICP: m^2 for a difference of light as large as that of a usual surface.
+ICP_ALPHA = 0.5
 
 
 def build_compared(
@@ -35,17 +35,18 @@ def build_compared(
     keys = key_scans(log, settings.step_m, settings.step_rad)
     light = light or method == "paper"
     lights = light_scans(log, keys, calibrated(log)) if light else None
+    # With light only the beams that have some: points without a surface around them have none that could be compared.
     scans = [log.points(int(n)) for n in keys]
-    brightness = _relative(log) if light else None
+    beams = scans if lights is None else [one.points for one in lights]
+    brightness = [np.zeros(len(one)) for one in beams] if lights is None else [np.exp(one.light) for one in lights]
     began, began_cpu = time.perf_counter(), time.process_time()
     paper = PaperFilter(replace(PaperSettings(), particles=settings.particles, seed=settings.seed), settings.noise)
     icp = Icp(ICP_ALPHA if light else 0.0)
     for k, n in enumerate(keys):
-        seen = np.zeros(len(scans[k])) if brightness is None else brightness[n, log.returned(int(n))]
         if method == "paper":
-            paper.process(log.odometry[n], log.driven[n], scans[k], seen)
+            paper.process(log.odometry[n], log.driven[n], beams[k], brightness[k])
         else:
-            icp.process(log.odometry[n], scans[k], seen)
+            icp.process(log.odometry[n], beams[k], brightness[k])
         spent = max(1e-9, time.perf_counter() - began)
         effective, number = (paper.effective, settings.particles) if method == "paper" else (1.0, 1)
         progress(Progress(k + 1, len(keys), number, effective, float(log.t[n] - log.t[0]) / spent))
@@ -64,12 +65,3 @@ def build_compared(
         None if lights is None else grid_light(grid, path, lights),
         None if lights is None else contrast(lights),
     )
-
-
-def _relative(log: Log) -> Floats:
-    """(S, B) light as received, in medians of the whole log."""
-    if log.intensities is None:
-        raise LightError("it holds no received light intensity")
-    received = np.nan_to_num(log.intensities, nan=0.0, posinf=0.0)
-    middle = float(np.median(received[received > 0.0]))
-    return received / middle

@@ -20,7 +20,7 @@ _SMALL = 1e-4
 
 
 class Icp:
-    """Feed it scans in order. ``alpha`` m^2 per squared median of light; 0 is plain ICP."""
+    """Feed it scans in order. ``alpha`` m^2 per squared light of a usual surface; 0 is plain ICP."""
 
     def __init__(self, alpha: float) -> None:
         self._weight = math.sqrt(alpha)
@@ -29,7 +29,7 @@ class Icp:
         self._odometry: Floats | None = None
 
     def process(self, odometry: Floats, points: Floats, light: Floats) -> None:
-        """One scan: ``odometry`` (3,), ``points`` (M, 2) with their ``light`` (M,), in medians of the log."""
+        """One scan: ``odometry`` (3,), ``points`` (M, 2) with their ``light`` (M,), 1 for a usual surface."""
         pose = np.zeros(3)
         if self._odometry is not None:
             pose = compose(self.poses[-1], between(self._odometry, odometry))

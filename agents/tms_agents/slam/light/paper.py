@@ -28,20 +28,20 @@ _PLANE = SIDE * SIDE
 
 @dataclass(frozen=True, slots=True)
 class PaperSettings:
-    """``alpha`` m^2 for a difference of light as large as its median; ``sigma`` m^2 of the mean squared distance; a
+    """``alpha`` m^2 for a difference of light as large as that of a usual surface; ``sigma`` m^2 of the mean squared distance; a
     point farther than ``reach`` m from all of the map has no corresponding one."""
 
     particles: int = 512
     seed: int = 0
-    alpha: float = 0.01
-    sigma: float = 1e-3
+    alpha: float = 0.05
+    sigma: float = 3e-4
     cell_m: float = 0.05
     reach_m: float = 0.3
     beams: int = 180
 
 
 class PaperFilter:
-    """Feed it scans in order; light is in medians of the whole log."""
+    """Feed it scans in order; light is in that of a usual surface, so that distance and angle are out of it."""
 
     def __init__(self, settings: PaperSettings, noise: OdometryNoise) -> None:
         self.settings, self.noise = settings, noise
