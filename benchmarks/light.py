@@ -71,9 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             rows(place, group, methods, {seed: _simulated(place, seed) for seed in seeds}, seeds)
 
 
-def rows(
-    place: str, group: str, methods: list[str], drives: dict[int, tuple[Log, Floats]], seeds: list[int]
-) -> None:
+def rows(place: str, group: str, methods: list[str], drives: dict[int, tuple[Log, Floats]], seeds: list[int]) -> None:
     """A line per method over all ``seeds``; a single drive is used for all of them."""
     for method in methods:
         found, spent = [], []

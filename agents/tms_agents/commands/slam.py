@@ -34,7 +34,9 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument("log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl; each may be .gz")
     run.add_argument("--out", type=Path, required=True, metavar="DIR")
     run.add_argument("--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)")
-    run.add_argument("--particles", type=int, metavar="N", help=f"default: {DEFAULTS.particles} (paper: {PAPER.particles})")
+    run.add_argument(
+        "--particles", type=int, metavar="N", help=f"default: {DEFAULTS.particles} (paper: {PAPER.particles})"
+    )
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
     run.add_argument("--intensity", action="store_true", help="use received light; writes imap.npy and imap.png, too")
@@ -42,7 +44,7 @@ def main(argv: Sequence[str]) -> int:
         "--method",
         choices=("filter", "paper", "icp"),
         default="filter",
-        help="to compare with: the paper's particle filter (always with light), scan by scan (with --intensity: Intensity-ICP)",
+        help="paper (always with light) and icp (with --intensity: Intensity-ICP) are there to compare with",
     )
     run.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
     run.set_defaults(work=_run)

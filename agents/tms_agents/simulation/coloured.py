@@ -58,7 +58,10 @@ def room(random: np.random.Generator) -> Place:
     for x, y in ((0.6, 3.2), (2.6, 5.4), (7.3, 4.6), (4.2, 3.0), (6.9, 0.7), (2.2, 0.6), (5.2, 5.5)):
         half, deep, turn = random.uniform(0.2, 0.5), random.uniform(0.15, 0.3), random.uniform(-0.5, 0.5)
         c, s = np.cos(turn), np.sin(turn)
-        box = [(x + c * a - s * b, y + s * a + c * b) for a, b in ((-half, -deep), (half, -deep), (half, deep), (-half, deep))]
+        box = [
+            (x + c * a - s * b, y + s * a + c * b)
+            for a, b in ((-half, -deep), (half, -deep), (half, deep), (-half, deep))
+        ]
         walls += [(*p, *q) for p, q in zip(box, box[1:] + box[:1], strict=True)]
     tour = [(1.6, 1.8), (4.0, 1.5), (6.4, 2.2), (6.0, 4.2), (4.2, 4.4), (2.2, 4.0)]
     jittered = np.array(tour) + random.uniform(-0.2, 0.2, (6, 2))

@@ -42,21 +42,20 @@ def record(name: str, seed: int) -> Recording:
     place = PLACES[name](random)
     t, truth = _driven(path_through(place.way, random))
     rolled = _rolled(truth, place, random)
-    lines = [
-        (float(a), json.dumps({"t": round(float(a), 3), "type": "odom", "x": round(x, 5), "y": round(y, 5), "theta": round(h, 6)}))
-        for a, (x, y, h) in zip(t, rolled.tolist(), strict=True)
-    ]  # fmt: skip
+    lines = []
+    for a, (x, y, theta) in zip(t.tolist(), rolled.round(6).tolist(), strict=True):
+        lines.append((a, json.dumps({"t": round(a, 3), "type": "odom", "x": x, "y": y, "theta": theta})))
     scans = np.arange(0.04, t[-1], 0.2)
     poses = _at(t, truth, scans)
     gains = np.exp(random.normal(0.0, _UNEVEN, _BEAMS))
     shapes = _shapes(place.walls)
-    for a, pose in zip(scans, poses, strict=True):
+    for a, pose in zip(scans.tolist(), poses, strict=True):
         ranges, light = _scan(shapes, pose, gains, random)
         scan = {
-            "t": round(float(a), 3), "type": "scan", "angle_min": _FIRST, "angle_increment": _STEP,
+            "t": round(a, 3), "type": "scan", "angle_min": _FIRST, "angle_increment": _STEP,
             "range_max": _FARTHEST, "ranges": ranges.tolist(), "intensities": light.tolist(),
         }  # fmt: skip
-        lines.append((float(a), json.dumps(scan)))
+        lines.append((a, json.dumps(scan)))
     lines.sort(key=lambda one: one[0])
     models = json.dumps({"robot": {"laser_pose": LASER}, "tags": {}})
     return Recording([line for _, line in lines], models, scans, poses, _at(t, rolled, scans), place.walls)
@@ -116,7 +115,11 @@ def _seen_from_start(truth: Floats) -> Floats:
 def _scan(shapes: Shapes, pose: Floats, gains: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
     """(ranges m, 0 where nothing came back, intensities) of one scan."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
-    laser = (pose[0] + c * LASER[0] - s * LASER[1], pose[1] + s * LASER[0] + c * LASER[1], float(np.arctan2(s, c)) + LASER[2])
+    laser = (
+        pose[0] + c * LASER[0] - s * LASER[1],
+        pose[1] + s * LASER[0] + c * LASER[1],
+        float(np.arctan2(s, c)) + LASER[2],
+    )
     met = cast(shapes, laser, float(_FIRST), float(_STEP), _BEAMS, 0.0)
     ranges = np.where(np.isfinite(met.ranges), met.ranges, _FARTHEST)
     falls = 1.0 / ((ranges / _NEAR_M) ** 2 + 1.0) ** 0.9

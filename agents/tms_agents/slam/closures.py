@@ -61,7 +61,9 @@ def find_closure(
     pose, hessian, fit = there
     if submap.light is not None and submaps.lights is not None:
         beams = submaps.light_cloud(submaps.lights, key, _AROUND)
-        placed = placed_by_light(submap.maps, submap.light, cloud, beams, pose, hessian, window, submaps.light_temperature)
+        placed = placed_by_light(
+            submap.maps, submap.light, cloud, beams, pose, hessian, window, submaps.light_temperature
+        )
         if placed is None or not _agrees(submap, cloud, placed[0])[0]:
             return None
         pose, hessian = placed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ def write_map(folder: Path, grid: GridMap, path: Floats, light: GridLight | None
     ``path`` (K, 3) of the robot is drawn into the picture. With ``light`` also ``imap.npy`` and ``imap.png``, and its
     layers in ``map.npz``.
     """
-    layers = {}
+    layers: dict[str, Any] = {}
     if light is not None:
         layers = {"light_mean": light.mean, "light_variance": light.variance, "light_count": light.count}
         np.save(folder / "imap.npy", light.reflectance().astype(np.float32))

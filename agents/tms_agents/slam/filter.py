@@ -51,7 +51,9 @@ class ParticleFilter:
         """One scan: ``odometry`` (3,), ``driven`` (2,) as in `Log`, ``points`` (M, 2) m seen from the robot."""
         if self._odometry is not None:
             motion = between(self._odometry, odometry)
-            self._predict_and_match(motion, self.settings.noise.covariance(motion, driven - self._driven), points, light)
+            self._predict_and_match(
+                motion, self.settings.noise.covariance(motion, driven - self._driven), points, light
+            )
             self._resample()
         self._odometry, self._driven = odometry, driven
         self.ancestry.append(self.poses)

@@ -71,9 +71,7 @@ class Maps:
         self.frame = grown([self.occupancy, self.distance], self.frame, self.resolution, lowest - edge, highest + edge)
 
 
-def grown(
-    tiles: Sequence[TiledMaps], frame: Floats, resolution: float, lowest: Floats, highest: Floats
-) -> Floats:
+def grown(tiles: Sequence[TiledMaps], frame: Floats, resolution: float, lowest: Floats, highest: Floats) -> Floats:
     """``frame`` after all ``tiles``, which share it, have grown with a margin until both corners (m) are inside."""
     span = SIDE * resolution
     height, width = tiles[0].directory.shape[1:]
@@ -85,4 +83,5 @@ def grown(
     right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
     for each in tiles:
         each.extend(bottom, left, top, right)
-    return frame - np.array([left * span, bottom * span, 0.0])
+    moved: Floats = frame - np.array([left * span, bottom * span, 0.0])
+    return moved

@@ -105,7 +105,7 @@ class Submaps:
     def light_cloud(self, lights: Sequence[LightScan], key: int, around: int) -> LightScan:
         """The light of the scans up to ``around`` keys from ``key``, in its frame."""
         keys = np.arange(max(0, key - around), min(len(self.path), key + around + 1))
-        return merged([lights[k] for k in keys], between(self.path[key][None], self.path[keys]))
+        return merged([lights[int(k)] for k in keys], between(self.path[key][None], self.path[keys]))
 
     def cloud(self, key: int, around: int, most: int) -> Floats:
         """At most ``most`` points (M, 2) of the scans up to ``around`` keys from ``key``, in its frame, evenly

@@ -1,8 +1,9 @@
 """Many maps that share their tiles until one of them writes: copy-on-write in plain arrays, for the kernels.
 
 A tile is 32 x 32 cells (bytes, where nothing else is said). Every map has a directory of tile numbers over the same
-rectangle; tile 0 is the blank tile, which all maps share and nobody writes. Kernels write only to tiles that ``make_writable`` has given to their map
-alone, so maps can be written side by side, and what they hold does not depend on the number of threads.
+rectangle; tile 0 is the blank tile, which all maps share and nobody writes. Kernels write only to tiles that
+``make_writable`` has given to their map alone, so maps can be written side by side, and what they hold does not depend
+on the number of threads.
 """
 
 from __future__ import annotations

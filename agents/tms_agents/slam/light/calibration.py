@@ -63,7 +63,9 @@ def learn(ranges: Floats, incidence: Floats, intensities: Floats) -> Calibration
     pairs = usable[:-1][np.diff(usable) == 1]
     pairs = pairs[:: max(1, len(pairs) // _MOST)]
     basis = _basis(log_range[pairs], incidence[pairs], nearest, farthest)
-    apart = np.abs((logs[pairs + 1] - logs[pairs]) - (_differences(log_range, incidence, pairs, nearest, farthest) @ table))
+    apart = np.abs(
+        (logs[pairs + 1] - logs[pairs]) - (_differences(log_range, incidence, pairs, nearest, farthest) @ table)
+    )
     noise = _MAD / np.sqrt(2.0) * _fitted(basis, apart)
     shape = (_RANGES, _INCIDENCES)
     return Calibration(nearest, farthest, table.reshape(shape), np.maximum(noise, _LEAST_NOISE).reshape(shape))
@@ -82,10 +84,14 @@ def _basis(log_range: Floats, incidence: Floats, nearest: float, farthest: float
     columns = incidence / STEEPEST * (_INCIDENCES - 1)
     i, u = _cell(rows, _RANGES)
     j, v = _cell(columns, _INCIDENCES)
-    knots = np.stack([i * _INCIDENCES + j, (i + 1) * _INCIDENCES + j, i * _INCIDENCES + j + 1, (i + 1) * _INCIDENCES + j + 1])
+    knots = np.stack(
+        [i * _INCIDENCES + j, (i + 1) * _INCIDENCES + j, i * _INCIDENCES + j + 1, (i + 1) * _INCIDENCES + j + 1]
+    )
     weights = np.stack([(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v])
     beams = np.broadcast_to(np.arange(len(log_range)), knots.shape)
-    return sparse.csr_array((weights.ravel(), (beams.ravel(), knots.ravel())), shape=(len(log_range), _RANGES * _INCIDENCES))
+    return sparse.csr_array(
+        (weights.ravel(), (beams.ravel(), knots.ravel())), shape=(len(log_range), _RANGES * _INCIDENCES)
+    )
 
 
 def _cell(places: Floats, knots: int) -> tuple[Floats, Floats]:

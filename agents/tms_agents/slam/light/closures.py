@@ -1,8 +1,8 @@
 """Light in loop closing: where along a corridor, or around a round hall, a later visit fits in.
 
-Where geometry leaves a direction open, the light of the cloud is correlated with that of the submap at every place along
-it. A revisit holds if its correlation is high there and clearly lower elsewhere; where there are no colours geometry
-alone decides as before.
+Where geometry leaves a direction open, the light of the cloud is correlated with that of the submap at every place
+along it. A revisit holds if its correlation is high there and clearly lower elsewhere; where there are no colours
+geometry alone decides as before.
 """
 
 from __future__ import annotations
@@ -32,7 +32,13 @@ _BEAMS, _BEAMS_COARSE = 900, 250
 
 
 def placed_by_light(
-    maps: Maps, light: LightMaps, cloud: Floats, beams: LightScan, pose: Floats, hessian: Floats, window: float,
+    maps: Maps,
+    light: LightMaps,
+    cloud: Floats,
+    beams: LightScan,
+    pose: Floats,
+    hessian: Floats,
+    window: float,
     temperature: float,
 ) -> tuple[Floats, Floats] | None:
     """(pose, hessian) where geometry and light agree, from those of geometry alone; None if light contradicts.
@@ -75,14 +81,16 @@ def _along_the_open(light: LightMaps, beams: LightScan, pose: Floats, hessian: F
     rivals = merit[np.abs(steps - steps[best]) > _AWAY_M]
     if merit[best] < 0.8 * _CORRELATED or (len(rivals) and rivals.max() > merit[best] - _RIVAL):
         return None
-    return places[best]
+    place: Floats = places[best]
+    return place
 
 
 def _moved(pose: Floats, direction: Floats, way: float) -> Floats:
     """``pose`` moved on along a twist (3,): straight on, or around the point that the twist turns about."""
     x, y, turn = direction * way
     if abs(turn) < 1e-9:
-        return pose + np.array([x, y, 0.0])
+        straight: Floats = pose + np.array([x, y, 0.0])
+        return straight
     cx, cy = -y / turn, x / turn
     c, s = math.cos(turn), math.sin(turn)
     moved: Floats = pose + np.array([cx - c * cx + s * cy, cy - s * cx - c * cy, turn])
@@ -91,9 +99,7 @@ def _moved(pose: Floats, direction: Floats, way: float) -> Floats:
 
 
 @njit(cache=True)
-def correlation(
-    directory: Ints, cells: Singles, frame: Floats, beams: Floats, pose: Floats
-) -> tuple[float, float]:
+def correlation(directory: Ints, cells: Singles, frame: Floats, beams: Floats, pose: Floats) -> tuple[float, float]:
     """(correlation of beams and map, share of the beams whose light is known) at ``pose`` (3,)."""
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     found = np.empty(3)

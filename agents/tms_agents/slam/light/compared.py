@@ -15,7 +15,7 @@ from tms_agents.slam.keyframes import key_scans, poses_of_all
 from tms_agents.slam.light.gridlight import grid_light
 from tms_agents.slam.light.icp import Icp
 from tms_agents.slam.light.paper import PaperFilter, PaperSettings
-from tms_agents.slam.light.scans import LightError, calibrated, contrast, light_scans
+from tms_agents.slam.light.scans import calibrated, contrast, light_scans
 from tms_agents.slam.logs import Log
 from tms_agents.slam.mapping import Progress, Result
 from tms_agents.slam.settings import Settings

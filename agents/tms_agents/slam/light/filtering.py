@@ -35,9 +35,9 @@ class ParticleLight:
         s, tiles = self._settings, self.maps.tiles
         beams = as_beams(scan.thinned(s.light_beams))
         match_light_all(
-            maps.distance.directory, maps.distance.cells, maps.metres, maps.frame, points,
-            maps.occupancy.directory, maps.occupancy.cells, tiles.directory, tiles.cells, self.maps.frame, beams, priors, precision, s.sigma_m, s.temperature, s.light_temperature,
-            poses, hessians, results,
+            maps.distance.directory, maps.distance.cells, maps.metres, maps.frame, points, maps.occupancy.directory,
+            maps.occupancy.cells, tiles.directory, tiles.cells, self.maps.frame, beams, priors, precision, s.sigma_m,
+            s.temperature, s.light_temperature, poses, hessians, results,
         )  # fmt: skip
 
     def integrate(self, poses: Floats, scan: LightScan) -> None:

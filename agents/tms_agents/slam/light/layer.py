@@ -59,8 +59,8 @@ class LightMaps:
 @njit(cache=True, inline="always")
 def _cell(pose: Floats, cosine: float, sine: float, x: float, y: float, frame: Floats) -> tuple[int, int]:
     return (
-        int(math.floor((pose[0] + cosine * x - sine * y - frame[0]) * frame[2])),
-        int(math.floor((pose[1] + sine * x + cosine * y - frame[1]) * frame[2])),
+        math.floor((pose[0] + cosine * x - sine * y - frame[0]) * frame[2]),
+        math.floor((pose[1] + sine * x + cosine * y - frame[1]) * frame[2]),
     )
 
 
@@ -101,7 +101,7 @@ def light_at(directory: Ints, cells: Singles, x: float, y: float, found: Floats)
 
     0 where nothing is known near by.
     """
-    cx, cy = int(math.floor(x)), int(math.floor(y))
+    cx, cy = math.floor(x), math.floor(y)
     height, width = directory.shape[0] << SHIFT, directory.shape[1] << SHIFT
     if cx < _REACH or cy < _REACH or cx >= width - _REACH or cy >= height - _REACH:
         return 0.0

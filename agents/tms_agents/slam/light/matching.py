@@ -97,8 +97,8 @@ def _ending_in_the_known(
     cosine, sine = math.cos(pose[2]), math.sin(pose[2])
     kept = np.zeros(len(points), dtype=np.bool_)
     for m in range(len(points)):
-        x = int(math.floor((pose[0] + cosine * points[m, 0] - sine * points[m, 1] - frame[0]) * frame[2]))
-        y = int(math.floor((pose[1] + sine * points[m, 0] + cosine * points[m, 1] - frame[1]) * frame[2]))
+        x = math.floor((pose[0] + cosine * points[m, 0] - sine * points[m, 1] - frame[0]) * frame[2])
+        y = math.floor((pose[1] + sine * points[m, 0] + cosine * points[m, 1] - frame[1]) * frame[2])
         if not (0 <= x < width and 0 <= y < height):
             continue
         place = ((y & MASK) << SHIFT) | (x & MASK)
@@ -191,9 +191,7 @@ def linearise_light(
     for m in range(len(beams)):
         rx = cosine * beams[m, 0] - sine * beams[m, 1]
         ry = sine * beams[m, 0] + cosine * beams[m, 1]
-        known = light_at(
-            directory, cells, (pose[0] + rx - frame[0]) * scale, (pose[1] + ry - frame[1]) * scale, found
-        )
+        known = light_at(directory, cells, (pose[0] + rx - frame[0]) * scale, (pose[1] + ry - frame[1]) * scale, found)
         own = beams[m, 5] * beams[m, 5]
         if known * own < _KNOWN:
             cost += usual

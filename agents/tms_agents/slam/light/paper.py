@@ -1,10 +1,11 @@
-"""The particle filter of the paper, as it is written: blind draws, nearest points, light as it was received.
+"""The particle filter of the paper: blind draws, nearest points, all resampled after every scan.
 
-Received-light SLAM after "SLAM algorithm using scan data with received light intensity" (papers/intensity-slam, section
-3): poses are drawn from the odometry with a two-dimensional Gaussian (equation 2: way and turn), a particle's likelihood
-is exp(-d^2 / 2 sigma^2) of the mean squared distance d to the nearest points of its map plus alpha times the squared
-difference of their light (equations 3 and 4), and all particles are resampled after every scan. Every particle has a map
-of scan points of its own; a cell of it keeps the first point that fell there.
+From the paper on SLAM with the received light intensity of a SOKUIKI sensor, section 3: poses are drawn from the odometry
+with a two-dimensional Gaussian (equation 2: way and turn); a particle's likelihood is exp(-d^2 / 2 sigma^2) of the mean
+squared distance d to the nearest points of its map plus alpha times the squared difference of their light (equations 3
+and 4). Every particle has a map of scan points of its own, a cell of which keeps the first point that fell there. The
+paper does not say whether its light is corrected; here it is, by the same calibration as elsewhere: as received it follows
+the robot rather than the place, and this filter is then as far off as without light.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ _PLANE = SIDE * SIDE
 
 @dataclass(frozen=True, slots=True)
 class PaperSettings:
-    """``alpha`` m^2 for a difference of light as large as that of a usual surface; ``sigma`` m^2 of the mean squared distance; a
-    point farther than ``reach`` m from all of the map has no corresponding one."""
+    """``alpha`` m^2 for a difference of light as large as that of a usual surface; ``sigma`` m^2 of the mean squared
+    distance; a point farther than ``reach_m`` from all of the map has no corresponding one."""
 
     particles: int = 512
     seed: int = 0
@@ -118,7 +119,7 @@ def _add_points(directory: Ints, cells: Singles, frame: Floats, poses: Floats, p
         for m in range(len(points)):
             x = poses[n, 0] + cosine * points[m, 0] - sine * points[m, 1]
             y = poses[n, 1] + sine * points[m, 0] + cosine * points[m, 1]
-            i, j = int(math.floor((x - frame[0]) * frame[2])), int(math.floor((y - frame[1]) * frame[2]))
+            i, j = math.floor((x - frame[0]) * frame[2]), math.floor((y - frame[1]) * frame[2])
             tile, place = directory[n, j >> SHIFT, i >> SHIFT], ((j & MASK) << SHIFT) | (i & MASK)
             if math.isnan(cells[tile, place]):
                 cells[tile, place], cells[tile, _PLANE + place], cells[tile, 2 * _PLANE + place] = x, y, light[m]
@@ -151,14 +152,12 @@ def _mean_distances(
 
 
 @njit(cache=True)
-def _nearest(
-    directory: Ints, cells: Singles, frame: Floats, x: float, y: float, reach: float
-) -> tuple[float, float]:
+def _nearest(directory: Ints, cells: Singles, frame: Floats, x: float, y: float, reach: float) -> tuple[float, float]:
     """(squared distance m^2 to the nearest point, its light), ring by ring around the cell of (x, y)."""
     height, width = directory.shape[0] << SHIFT, directory.shape[1] << SHIFT
-    cx, cy = int(math.floor((x - frame[0]) * frame[2])), int(math.floor((y - frame[1]) * frame[2]))
+    cx, cy = math.floor((x - frame[0]) * frame[2]), math.floor((y - frame[1]) * frame[2])
     best, light = reach * reach, 0.0
-    for ring in range(int(math.ceil(reach * frame[2])) + 1):
+    for ring in range(math.ceil(reach * frame[2]) + 1):
         nearest = max(0, ring - 1) / frame[2]
         if best <= nearest * nearest:
             break

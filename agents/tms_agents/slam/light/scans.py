@@ -55,7 +55,9 @@ def calibrated(log: Log) -> Calibration:
         raise LightError("it holds no received light intensity")
     every = max(1, len(log) // _LEARNT_FROM)
     parts = [_beams(log, n) for n in range(0, len(log), every)]
-    ranges, incidence, intensities = (np.concatenate(column) for column in zip(*((a, c, d) for a, _, c, d, _ in parts), strict=True))
+    ranges, incidence, intensities = (
+        np.concatenate(column) for column in zip(*((a, c, d) for a, _, c, d, _ in parts), strict=True)
+    )
     try:
         return learn(ranges, incidence, intensities)
     except ValueError as error:
