@@ -39,18 +39,23 @@ class Recording:
 def record(name: str, seed: int) -> Recording:
     """A drive through the place ``name`` of `PLACES`; everything is drawn from ``seed``."""
     random = np.random.default_rng([seed, list(PLACES).index(name)])
-    place = PLACES[name](random)
+    return drive_through(PLACES[name](random), random)
+
+
+def drive_through(place: Place, random: np.random.Generator) -> Recording:
+    """The whole way through ``place``."""
     t, truth = _driven(path_through(place.way, random))
     rolled = _rolled(truth, place, random)
     lines = []
-    for a, (x, y, theta) in zip(t.tolist(), rolled.round(6).tolist(), strict=True):
-        lines.append((a, json.dumps({"t": round(a, 3), "type": "odom", "x": x, "y": y, "theta": theta})))
+    for a, (x, y, theta) in zip(t.tolist(), rolled.tolist(), strict=True):
+        pose = {"x": round(x, 5), "y": round(y, 5), "theta": round(theta, 6)}
+        lines.append((a, json.dumps({"t": round(a, 3), "type": "odom", **pose})))
     scans = np.arange(0.04, t[-1], 0.2)
     poses = _at(t, truth, scans)
     gains = np.exp(random.normal(0.0, _UNEVEN, _BEAMS))
     shapes = _shapes(place.walls)
-    for a, pose in zip(scans.tolist(), poses, strict=True):
-        ranges, light = _scan(shapes, pose, gains, random)
+    for a, seen_from in zip(scans.tolist(), poses, strict=True):
+        ranges, light = _scan(shapes, seen_from, gains, random)
         scan = {
             "t": round(a, 3), "type": "scan", "angle_min": _FIRST, "angle_increment": _STEP,
             "range_max": _FARTHEST, "ranges": ranges.tolist(), "intensities": light.tolist(),
@@ -75,16 +80,16 @@ def _at(times: Floats, poses: Floats, t: Floats) -> Floats:
     return np.stack([np.interp(t, times, column) for column in (*poses[:, :2].T, np.unwrap(poses[:, 2]))], axis=-1)
 
 
-def _rolled(truth: Floats, place: Place, random: np.random.Generator) -> Floats:
+def _rolled(truth: Floats, place: Place, chance: np.random.Generator) -> Floats:
     """What the wheels say, from (0, 0, 0) on; ``place.off`` tells how wrong they are where they are most."""
     steps = np.diff(truth, axis=0)
     way = np.hypot(steps[:, 0], steps[:, 1])
     wrong = np.stack(
         [
-            way * random.uniform(-0.045, 0.045) + np.sqrt(way) * random.normal(0.0, 0.01, len(way)),
-            steps[:, 2] * random.uniform(-0.05, 0.05)
-            + way * random.uniform(0.0015, 0.003) * random.choice([-1.0, 1.0])
-            + np.sqrt(way) * random.normal(0.0, 0.004, len(way)),
+            way * chance.uniform(-0.045, 0.045) + np.sqrt(way) * chance.normal(0.0, 0.01, len(way)),
+            steps[:, 2] * chance.uniform(-0.05, 0.05)
+            + way * chance.uniform(0.0015, 0.003) * chance.choice([-1.0, 1.0])
+            + np.sqrt(way) * chance.normal(0.0, 0.004, len(way)),
         ]
     )
     if place.off is None:

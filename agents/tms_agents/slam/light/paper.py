@@ -1,11 +1,11 @@
 """The particle filter of the paper: blind draws, nearest points, all resampled after every scan.
 
-From the paper on SLAM with the received light intensity of a SOKUIKI sensor, section 3: poses are drawn from the odometry
-with a two-dimensional Gaussian (equation 2: way and turn); a particle's likelihood is exp(-d^2 / 2 sigma^2) of the mean
-squared distance d to the nearest points of its map plus alpha times the squared difference of their light (equations 3
-and 4). Every particle has a map of scan points of its own, a cell of which keeps the first point that fell there. The
-paper does not say whether its light is corrected; here it is, by the same calibration as elsewhere: as received it follows
-the robot rather than the place, and this filter is then as far off as without light.
+From the paper on SLAM with the received light intensity of a SOKUIKI sensor, section 3: poses are drawn from the
+odometry with a two-dimensional Gaussian (equation 2: way and turn); a particle's likelihood is exp(-d^2 / 2 sigma^2) of
+the mean squared distance d to the nearest points of its map plus alpha times the squared difference of their light
+(equations 3 and 4). Every particle has a map of scan points of its own, a cell of which keeps the first point that fell
+there. The paper does not say whether its light is corrected; here it is, by the same calibration as elsewhere: as
+received it follows the robot rather than the place, and this filter is then as far off as without light.
 """
 
 from __future__ import annotations
