@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-light faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -16,6 +16,7 @@ help:
 	@echo "make bench-floor    floor sensing on simulated rooms (FLOOR='--quick' for a few minutes)"
 	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
 	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
+	@echo "make bench-light    received light in mapping, on simulated places (LIGHT='--places corridor')"
 	@echo "make faults    the long fault tests (30 kills and more)"
 	@echo "make peers     tests against programs of other people (installs tshark)"
 	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
@@ -54,6 +55,9 @@ floor-pictures: $(READY)
 
 bench-slam: $(READY)
 	$(BIN)/python benchmarks/slam.py $(SLAM)
+
+bench-light: $(READY)
+	$(BIN)/python benchmarks/light.py $(LIGHT)
 
 faults: $(READY)
 	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults

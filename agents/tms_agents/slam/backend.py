@@ -9,7 +9,6 @@ import numpy as np
 
 from tms_agents.slam.closures import Closure, consistent, find_closure
 from tms_agents.slam.geometry import Floats, between, wrapped
-from tms_agents.slam.light.filtering import add_light
 from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.matching import linearise
 from tms_agents.slam.mending import mended
@@ -185,8 +184,8 @@ def _chain(submaps: Submaps, odometry: Floats, driven: Floats, scans: Sequence[F
             maps.distance.directory[0], maps.distance.cells, maps.metres, maps.frame, scans[k], pose, pose,
             prior * _WITNESSES, settings.sigma_m, 1.0, hessian, gradient, result,
         )  # fmt: skip
-        if submap.light is not None and submaps.lights is not None:
-            add_light(submap.light, submaps.lights[k], pose, settings, hessian)
+        if submaps.light is not None:
+            submaps.light.add(submaps.of(k), k, hessian)
         covariance = turned.T @ np.linalg.inv(hessian) @ turned * _WITNESSES + np.diag(np.square(_FLOOR))
         information[k - 1] = np.linalg.inv(covariance)
     keys = np.arange(len(path))

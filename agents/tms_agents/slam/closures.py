@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from tms_agents.slam.agreement import agreement
 from tms_agents.slam.branch_and_bound import best_pose
 from tms_agents.slam.geometry import Floats, between, compose, inverse, wrapped
-from tms_agents.slam.light.closures import placed_by_light
 from tms_agents.slam.matching import SHARE, match
 from tms_agents.slam.submaps import Submap, Submaps
 
@@ -59,11 +58,8 @@ def find_closure(
     if there is None:
         return None
     pose, hessian, fit = there
-    if submap.light is not None and submaps.lights is not None:
-        beams = submaps.light_cloud(submaps.lights, key, _AROUND)
-        placed = placed_by_light(
-            submap.maps, submap.light, cloud, beams, pose, hessian, window, submaps.light_temperature
-        )
+    if submaps.light is not None:
+        placed = submaps.light.placed(number, key, _AROUND, submap.maps, 0, cloud, pose, hessian, window)
         if placed is None or not _agrees(submap, cloud, placed[0])[0]:
             return None
         pose, hessian = placed

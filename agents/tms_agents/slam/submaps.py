@@ -12,8 +12,8 @@ import numpy as np
 from tms_agents.slam.branch_and_bound import pyramid
 from tms_agents.slam.geometry import Bytes, Floats, between, transform
 from tms_agents.slam.gridmap import render
-from tms_agents.slam.light.layer import LightMaps
-from tms_agents.slam.light.scans import LightScan, merged
+from tms_agents.slam.light.scans import LightScan
+from tms_agents.slam.light.submaps import LightSubmaps
 from tms_agents.slam.maps import Maps
 from tms_agents.slam.settings import Settings
 
@@ -27,13 +27,11 @@ _POOL = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Submap:
-    """In the frame of the key scan ``anchor``: ``maps`` holds one map; ``sigma`` m is the error of a beam;
-    ``light`` holds one map, too, if the drive is mapped with light."""
+    """In the frame of the key scan ``anchor``: ``maps`` holds one map; ``sigma`` m is the error of a beam."""
 
     anchor: int
     maps: Maps
     sigma: float
-    light: LightMaps | None = None
 
     def levels(self) -> Bytes:
         """The pyramid to search in, from ``origin`` on in cells of 1 / ``scale`` m."""
@@ -65,12 +63,12 @@ class Submaps:
         settings: Settings,
         lights: Sequence[LightScan] | None = None,
     ) -> None:
-        self.lights, self.light_temperature = lights, settings.light_temperature
         self.path, self._scans, self._laser, self._settings = path, scans, laser, settings
         way = driven[:, 0] + settings.submap_m / settings.submap_rad * driven[:, 1]
         number = ((way - way[0]) / settings.submap_m).astype(int)
         self.first = np.concatenate([np.flatnonzero(np.diff(number, prepend=-1)), [len(path)]])
         self.anchors = (self.first[:-1] + self.first[1:] - 1) // 2
+        self.light = None if lights is None else LightSubmaps(lights, path, self.first, self.anchors, settings)
         self._rendered: OrderedDict[int, Submap] = OrderedDict()
         self._pyramids: OrderedDict[int, Bytes] = OrderedDict()
 
@@ -95,17 +93,7 @@ class Submaps:
         relative = between(self.path[anchor][None], self.path[keys])
         s = self._settings
         maps = render(relative, [self._scans[k] for k in keys], self._laser, s.resolution, s.reach_m)
-        if self.lights is None:
-            return Submap(anchor, maps, s.sigma_m)
-        light = LightMaps(1, s.light_m)
-        for pose, k in zip(relative, keys, strict=True):
-            light.integrate(pose[None], self.lights[k])
-        return Submap(anchor, maps, s.sigma_m, light)
-
-    def light_cloud(self, lights: Sequence[LightScan], key: int, around: int) -> LightScan:
-        """The light of the scans up to ``around`` keys from ``key``, in its frame."""
-        keys = np.arange(max(0, key - around), min(len(self.path), key + around + 1))
-        return merged([lights[int(k)] for k in keys], between(self.path[key][None], self.path[keys]))
+        return Submap(anchor, maps, s.sigma_m)
 
     def cloud(self, key: int, around: int, most: int) -> Floats:
         """At most ``most`` points (M, 2) of the scans up to ``around`` keys from ``key``, in its frame, evenly

@@ -33,6 +33,7 @@ _BEAMS, _BEAMS_COARSE = 900, 250
 
 def placed_by_light(
     maps: Maps,
+    which: int,
     light: LightMaps,
     cloud: Floats,
     beams: LightScan,
@@ -43,9 +44,9 @@ def placed_by_light(
 ) -> tuple[Floats, Floats] | None:
     """(pose, hessian) where geometry and light agree, from those of geometry alone; None if light contradicts.
 
-    ``cloud`` (M, 2) are the points that geometry was matched with, ``window`` m how far it may be along what geometry
-    leaves open.
-    """  # fmt: skip
+    Geometry is map ``which`` of ``maps``; ``cloud`` (M, 2) are the points that geometry was matched with, ``window`` m
+    how far it may be along what geometry leaves open.
+    """
     tells = len(beams.light) > 50 and float(np.std(beams.light)) > _TELLS * float(np.median(beams.deviation))
     if not tells:
         return pose, hessian
@@ -55,7 +56,7 @@ def placed_by_light(
     found, curvature, result = start.copy(), np.empty((3, 3)), np.empty(3)
     tiles, rows = light.tiles, as_beams(beams.thinned(_BEAMS))
     match_light(
-        maps.distance.directory[0], maps.distance.cells, maps.metres, maps.frame, cloud, tiles.directory[0],
+        maps.distance.directory[which], maps.distance.cells, maps.metres, maps.frame, cloud, tiles.directory[0],
         tiles.cells, light.frame, rows, start, np.diag([1.0, 1.0, 25.0]), 0.1, 1.0, temperature, found, curvature,
         result,
     )  # fmt: skip

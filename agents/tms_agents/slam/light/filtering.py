@@ -6,7 +6,7 @@ import numpy as np
 
 from tms_agents.slam.geometry import Floats, Ints
 from tms_agents.slam.light.layer import LightMaps
-from tms_agents.slam.light.matching import linearise_light, match_light_all
+from tms_agents.slam.light.matching import match_light_all
 from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.maps import Maps
 from tms_agents.slam.settings import Settings
@@ -52,11 +52,3 @@ class ParticleLight:
 def as_beams(scan: LightScan) -> Floats:
     """(M, 6) for the kernels: x, y, the tangent's x, y, light, deviation."""
     return np.column_stack([scan.points, scan.tangents, scan.light, scan.deviation])
-
-
-def add_light(light: LightMaps, scan: LightScan, pose: Floats, settings: Settings, hessian: Floats) -> None:
-    """What ``scan`` tells of its ``pose`` (3,) in a single map of light is added to ``hessian`` (3, 3)."""
-    tiles, beams = light.tiles, as_beams(scan.thinned(settings.light_beams))
-    linearise_light(
-        tiles.directory[0], tiles.cells, light.frame, beams, settings.light_temperature, 0.0, pose, hessian, np.zeros(3)
-    )

@@ -94,7 +94,7 @@ def revisit(off: float, lights: LightScan) -> np.ndarray | None:
     beams = LightScan(*(getattr(lights, name)[inner] for name in ("points", "tangents", "light", "deviation")))
     hessian = np.diag([1.0, 5000.0, 5000.0])
     placed = placed_by_light(
-        maps, light, np.ascontiguousarray(cloud), beams, np.array([off, 0.0, 0.0]), hessian, 1.0, 1.5
+        maps, 0, light, np.ascontiguousarray(cloud), beams, np.array([off, 0.0, 0.0]), hessian, 1.0, 1.5
     )
     return None if placed is None else placed[0]
 
