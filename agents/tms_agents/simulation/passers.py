@@ -55,7 +55,7 @@ def passers(t: Floats, truth: Floats, per_10_m: float, legs: bool, random: np.ra
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
     robot = _Way(t, truth, way)
     kinds = (_crossing, _oncoming, _ahead, _standing)
-    count = int(round(per_10_m * way[-1] / 10.0))
+    count = round(per_10_m * way[-1] / 10.0)
     return [Passer(*kinds[n % len(kinds)](robot, float(s), random), legs) for n, s in enumerate(
         random.uniform(4.0, max(4.0, way[-1] - 8.0), count)
     )]  # fmt: skip
