@@ -10,7 +10,7 @@ from tms_agents.slam.backend import Closed, close_loops
 from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.gridmap import GridMap, grid_map, render
-from tms_agents.slam.keyframes import Indices, key_scans, poses_of_all
+from tms_agents.slam.keyframes import Indices, KeyScans, key_scans, poses_of_all
 from tms_agents.slam.logs import Log
 from tms_agents.slam.people import Mask
 from tms_agents.slam.settings import Settings
@@ -63,8 +63,8 @@ def build_map(log: Log, settings: Settings, progress: Callable[[Progress], None]
     del particles  # its maps are as large as what follows
     if settings.people:
         still = _others(scans, people_by_path(log, keys, scans, path))
-    closed = close_loops(path, log.odometry[keys], log.driven[keys], still, log.laser[:2], settings)
-    maps = render(closed.path, still, log.laser[:2], settings.resolution, settings.reach_m)
+    closed = close_loops(path, KeyScans(log.odometry[keys], log.driven[keys], still, log.laser[:2]), settings)
+    maps = render(closed.path, still, log.laser[:2], settings.resolution, settings.reach_m, fields=False)
     poses = poses_of_all(log, keys, closed.path)
     done_cpu = time.process_time()
     return Result(

@@ -168,7 +168,8 @@ def _whole(points: Floats, ranges: Floats, moving: Mask, found: Mask) -> None:
 @njit(cache=True)
 def _joined(points: Floats, ranges: Floats, m: int) -> bool:
     gap = math.hypot(points[m, 0] - points[m - 1, 0], points[m, 1] - points[m - 1, 1])
-    return gap < _GAP_M + _GAP_PER_M * min(ranges[m], ranges[m - 1])
+    joined: bool = gap < _GAP_M + _GAP_PER_M * min(ranges[m], ranges[m - 1])
+    return joined
 
 
 @njit(cache=True)
