@@ -50,14 +50,14 @@ class Passer:
         return np.array([np.interp(t, self.times, column) for column in self.places.T])
 
 
-def passers(t: Floats, truth: Floats, per_10_m: float, legs: bool, random: np.random.Generator) -> list[Passer]:
+def passers(t: Floats, truth: Floats, per_10_m: float, legs: bool, generator: np.random.Generator) -> list[Passer]:
     """People met on the way ``truth`` (S, 3) at times ``t`` (S,), so many per 10 m, of the four kinds in turn."""
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
     robot = _Way(t, truth, way)
     kinds = (_crossing, _oncoming, _ahead, _standing)
     count = round(per_10_m * way[-1] / 10.0)
-    return [Passer(*kinds[n % len(kinds)](robot, float(s), random), legs) for n, s in enumerate(
-        random.uniform(4.0, max(4.0, way[-1] - 8.0), count)
+    return [Passer(*kinds[n % len(kinds)](robot, float(s), generator), legs) for n, s in enumerate(
+        generator.uniform(4.0, max(4.0, way[-1] - 8.0), count)
     )]  # fmt: skip
 
 
@@ -80,36 +80,36 @@ class _Way:
         return np.column_stack([x - across * np.sin(heading), y + across * np.cos(heading)])
 
 
-def _crossing(robot: _Way, s: float, random: np.random.Generator) -> tuple[Floats, Floats]:
+def _crossing(robot: _Way, s: float, generator: np.random.Generator) -> tuple[Floats, Floats]:
     """From wall to wall, some metres before the robot."""
-    ahead, side, speed = random.uniform(1.5, 6.0), random.choice([-1.0, 1.0]), random.uniform(*_SPEED)
+    ahead, side, speed = generator.uniform(1.5, 6.0), generator.choice([-1.0, 1.0]), generator.uniform(*_SPEED)
     across = np.array([side * _AWAY_M, -side * _AWAY_M])
-    places = robot.beside(np.full(2, s + ahead) + np.array([0.0, random.uniform(-1.0, 1.0)]), across)
+    places = robot.beside(np.full(2, s + ahead) + np.array([0.0, generator.uniform(-1.0, 1.0)]), across)
     return _timed(robot.time(s), places, speed)
 
 
-def _oncoming(robot: _Way, s: float, random: np.random.Generator) -> tuple[Floats, Floats]:
+def _oncoming(robot: _Way, s: float, generator: np.random.Generator) -> tuple[Floats, Floats]:
     """Towards the robot and past it."""
-    ahead, across = random.uniform(6.0, 15.0), random.choice([-1.0, 1.0]) * random.uniform(0.5, 0.8)
+    ahead, across = generator.uniform(6.0, 15.0), generator.choice([-1.0, 1.0]) * generator.uniform(0.5, 0.8)
     ways = np.arange(s + ahead, max(0.0, s - 6.0), -0.5)
-    return _timed(robot.time(s), robot.beside(ways, np.full(len(ways), across)), random.uniform(*_SPEED))
+    return _timed(robot.time(s), robot.beside(ways, np.full(len(ways), across)), generator.uniform(*_SPEED))
 
 
-def _ahead(robot: _Way, s: float, random: np.random.Generator) -> tuple[Floats, Floats]:
+def _ahead(robot: _Way, s: float, generator: np.random.Generator) -> tuple[Floats, Floats]:
     """As fast as the robot, two metres before or a little beside it, then off through a wall."""
-    lead, across, long = random.uniform(1.0, 3.0), random.uniform(-0.7, 0.7), random.uniform(5.0, 15.0)
+    lead, across, long = generator.uniform(1.0, 3.0), generator.uniform(-0.7, 0.7), generator.uniform(5.0, 15.0)
     ways = np.arange(s, s + long, 0.25)
     times = np.interp(ways, robot.way, robot.t)
     places = robot.beside(ways + lead, np.full(len(ways), across))
     return _leaving(times, places, robot.beside(ways[-1:] + lead, np.array([np.copysign(_AWAY_M, across)])))
 
 
-def _standing(robot: _Way, s: float, random: np.random.Generator) -> tuple[Floats, Floats]:
+def _standing(robot: _Way, s: float, generator: np.random.Generator) -> tuple[Floats, Floats]:
     """Comes through a wall, stands beside the robot's way for a while, goes on."""
-    ahead, side, long = random.uniform(2.0, 6.0), random.choice([-1.0, 1.0]), random.uniform(3.0, 20.0)
+    ahead, side, long = generator.uniform(2.0, 6.0), generator.choice([-1.0, 1.0]), generator.uniform(3.0, 20.0)
     ways = np.full(3, s + ahead)
     places = robot.beside(ways, side * np.array([_AWAY_M, 0.7, 0.7]))
-    start, arrived = _timed(robot.time(s), places[:2], random.uniform(*_SPEED))[0]
+    start, arrived = _timed(robot.time(s), places[:2], generator.uniform(*_SPEED))[0]
     times = np.array([start, arrived, arrived + long])
     return _leaving(times, places, robot.beside(ways[:1], side * np.array([_AWAY_M])))
 

@@ -43,7 +43,7 @@ def mark_rays(
     (N, H * W) is scratch of zeros and is zeros again afterwards; ``width`` is W in tiles.
     """
     for n in prange(len(poses)):
-        p = min(np.int64(n), len(points) - 1)
+        p = int(min(np.int64(n), np.int64(len(points) - 1)))
         counts[n] = _mark(width, poses[n], points[p, : lengths[p]], laser, frame, seen[n], wanted[n])
 
 
@@ -67,7 +67,7 @@ def write_rays(
     to be. No scan touches more than ``capacity`` cells.
     """
     for n in prange(len(poses)):
-        p = min(np.int64(n), len(points) - 1)
+        p = int(min(np.int64(n), np.int64(len(points) - 1)))
         mine = points[p, : lengths[p]]
         counts[n] = _write(directory[n], cells, poses[n], mine, laser, frame, capacity, changed[n])
 
