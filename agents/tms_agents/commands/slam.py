@@ -14,12 +14,14 @@ from pathlib import Path
 import numba
 import numpy as np
 
+from tms_agents.bags import is_bag, read_messages
 from tms_agents.commands.slam_compare import compare
 from tms_agents.slam.export import write_map, write_trajectory
 from tms_agents.slam.light.compared import build_compared
 from tms_agents.slam.light.paper import PaperSettings
 from tms_agents.slam.light.scans import LightError
-from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
+from tms_agents.slam.logs import Log, parse_laser, read_log
+from tms_agents.slam.logs_ros import TYPES, parse_messages
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings
 from tms_client.cli import ArgumentParser, CommandError
@@ -31,7 +33,9 @@ def main(argv: Sequence[str]) -> int:
     parser = ArgumentParser(prog="tms slam", description="Laser mapping: build a map from a log, compare results.")
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="COMMAND")
     run = kinds.add_parser("run", help="trajectory and map of a recorded drive")
-    run.add_argument("log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl; each may be .gz")
+    run.add_argument(
+        "log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl (each may be .gz), ROS bag"
+    )
     run.add_argument("--out", type=Path, required=True, metavar="DIR")
     run.add_argument("--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)")
     run.add_argument(
@@ -46,6 +50,7 @@ def main(argv: Sequence[str]) -> int:
         default="filter",
         help="paper (always with light) and icp (with --intensity: Intensity-ICP) are there to compare with",
     )
+    run.add_argument("--keep-people", action="store_true", help="map people who walk by as everything else")
     run.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
     run.set_defaults(work=_run)
     other = kinds.add_parser("compare", help="two results, or one with known relations")
@@ -78,7 +83,12 @@ def _run(arguments: argparse.Namespace) -> int:
     except OSError as error:
         raise CommandError(f"{arguments.out}: {error.strerror or error}") from error
     numba.set_num_threads(arguments.threads or cores)
-    settings = Settings(particles=arguments.particles, resolution=arguments.resolution, seed=arguments.seed)
+    settings = Settings(
+        particles=arguments.particles,
+        resolution=arguments.resolution,
+        seed=arguments.seed,
+        people=not arguments.keep_people,
+    )
     began = time.perf_counter()
     try:
         if arguments.method == "filter":
@@ -106,12 +116,13 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _log(arguments: argparse.Namespace) -> Log:
     try:
-        log = read_log(arguments.log)
+        bag = is_bag(arguments.log)
+        log = parse_messages(read_messages(arguments.log, TYPES)) if bag else read_log(arguments.log)
         if arguments.models is not None:
             log = replace(log, laser=parse_laser(arguments.models.read_text()))
     except OSError as error:
         raise CommandError(f"{error.filename or arguments.log}: {error.strerror or error}") from error
-    except LogError as error:
+    except ValueError as error:
         raise CommandError(f"{arguments.log}: {error}") from error
     if log.bad_lines:
         sys.stderr.write(f"{arguments.log}: {log.bad_lines} lines could not be read and were left out\n")

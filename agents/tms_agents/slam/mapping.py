@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tms_agents.slam.backend import Closed, close_loops
 from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.gridmap import GridMap, grid_map, render
-from tms_agents.slam.keyframes import Indices, key_scans, poses_of_all
+from tms_agents.slam.keyframes import Indices, KeyScans, key_scans, poses_of_all
 from tms_agents.slam.light.gridlight import GridLight, grid_light
 from tms_agents.slam.light.scans import calibrated, contrast, light_scans
 from tms_agents.slam.logs import Log
+from tms_agents.slam.people import Mask
 from tms_agents.slam.settings import Settings
+from tms_agents.slam.witnesses import people_by_odometry, people_by_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,17 +63,21 @@ def build_map(
     lights = light_scans(log, keys, calibrated(log)) if light else None
     scans = [log.points(int(n)) for n in keys]
     began, began_cpu = time.perf_counter(), time.process_time()
+    still = _others(scans, people_by_odometry(log, keys, scans, settings.noise)) if settings.people else scans
     particles = ParticleFilter(settings, log.laser, light=light)
     for k, n in enumerate(keys):
-        particles.process(log.odometry[n], log.driven[n], scans[k], None if lights is None else lights[k])
+        particles.process(log.odometry[n], log.driven[n], still[k], None if lights is None else lights[k])
         spent = max(1e-9, time.perf_counter() - began)
         real_time = float(log.t[n] - log.t[0]) / spent
         progress(Progress(k + 1, len(keys), len(particles.poses), particles.effective, real_time))
     filtered_cpu = time.process_time()
     path, resamplings = particles.path(), particles.resamplings
     del particles  # its maps are as large as what follows
-    closed = close_loops(path, log.odometry[keys], log.driven[keys], scans, log.laser[:2], settings, lights)
-    maps = render(closed.path, scans, log.laser[:2], settings.resolution, settings.reach_m)
+    if settings.people:
+        still = _others(scans, people_by_path(log, keys, scans, path))
+    processed = KeyScans(log.odometry[keys], log.driven[keys], still, log.laser[:2])
+    closed = close_loops(path, processed, settings, lights)
+    maps = render(closed.path, still, log.laser[:2], settings.resolution, settings.reach_m, fields=False)
     poses = poses_of_all(log, keys, closed.path)
     grid = grid_map(maps, 0)
     done_cpu = time.process_time()
@@ -87,3 +93,8 @@ def build_map(
         None if lights is None else grid_light(grid, closed.path, lights),
         None if lights is None else contrast(lights),
     )
+
+
+def _others(scans: Sequence[Floats], people: Sequence[Mask]) -> list[Floats]:
+    """``scans`` without the points that are people."""
+    return [points[~gone] for points, gone in zip(scans, people, strict=True)]

@@ -30,6 +30,8 @@ class Settings:
     resample_below: float = 0.5
     #: Matches with a smaller share of beams near surfaces are searched for more widely.
     poor_share: float = 0.85
+    #: Whether people who walk by are left out of matching and of the map.
+    people: bool = True
     #: Loop closing: a submap every so many metres (or rad turned).
     submap_m: float = 8.0
     submap_rad: float = 6.0
