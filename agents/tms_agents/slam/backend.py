@@ -52,7 +52,7 @@ def close_loops(
 ) -> Closed:
     """``path``, ``odometry`` (K, 3), ``driven`` (K, 2), ``scans`` and perhaps ``lights`` of the key scans, ``laser``
     (2,)."""
-    again = mended(path, odometry, driven, scans, laser, settings)
+    again = mended(path, odometry, driven, scans, laser, settings, lights)
     closed = _closed(path, odometry, driven, scans, laser, settings, lights)
     if np.allclose(again, path, atol=1e-6):
         return closed
