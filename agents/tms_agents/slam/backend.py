@@ -45,7 +45,7 @@ class Closed:
 
 def close_loops(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Closed:
     """``path`` (K, 3) of the robot at the key scans, bent until revisits fit, by their ``lights``, too."""
-    again = mended(path, keys, settings)
+    again = mended(path, keys, settings, lights)
     closed = _closed(path, keys, settings, lights)
     if np.allclose(again, path, atol=1e-6):
         return closed

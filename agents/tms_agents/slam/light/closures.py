@@ -31,6 +31,11 @@ _KNOWN = 0.4
 _BEAMS, _BEAMS_COARSE = 900, 250
 
 
+def tells(beams: LightScan) -> bool:
+    """Whether there are colours to tell one place from another."""
+    return len(beams.light) > 50 and float(np.std(beams.light)) > _TELLS * float(np.median(beams.deviation))
+
+
 def placed_by_light(
     maps: Maps,
     which: int,
@@ -47,8 +52,7 @@ def placed_by_light(
     Geometry is map ``which`` of ``maps``; ``cloud`` (M, 2) are the points that geometry was matched with, ``window`` m
     how far it may be along what geometry leaves open.
     """
-    tells = len(beams.light) > 50 and float(np.std(beams.light)) > _TELLS * float(np.median(beams.deviation))
-    if not tells:
+    if not tells(beams):
         return pose, hessian
     start = _along_the_open(light, beams, pose, hessian, max(window, _REACH_M))
     if start is None:
