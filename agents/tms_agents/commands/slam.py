@@ -36,6 +36,9 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument("--out", type=Path, required=True, metavar="DIR")
     run.add_argument("--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)")
     run.add_argument("--particles", type=int, default=DEFAULTS.particles, metavar="N")
+    run.add_argument(
+        "--least-particles", type=int, default=0, metavar="N", help="adapt their number, from N on (default: fixed)"
+    )
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
     run.add_argument("--keep-people", action="store_true", help="map people who walk by as everything else")
@@ -56,6 +59,8 @@ def main(argv: Sequence[str]) -> int:
 def _run(arguments: argparse.Namespace) -> int:
     if not 1 <= arguments.particles <= 10_000:
         raise CommandError("--particles: from 1 to 10000")
+    if not 0 <= arguments.least_particles <= arguments.particles:
+        raise CommandError("--least-particles: from 1 to --particles, or 0")
     if not 0.01 <= arguments.resolution <= 0.5:
         raise CommandError("--resolution: from 0.01 to 0.5 m")
     if arguments.seed < 0:
@@ -71,6 +76,7 @@ def _run(arguments: argparse.Namespace) -> int:
     numba.set_num_threads(arguments.threads or cores)
     settings = Settings(
         particles=arguments.particles,
+        least_particles=arguments.least_particles,
         resolution=arguments.resolution,
         seed=arguments.seed,
         people=not arguments.keep_people,
