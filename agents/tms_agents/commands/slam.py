@@ -41,6 +41,9 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument(
         "--particles", type=int, metavar="N", help=f"default: {DEFAULTS.particles} (paper: {PAPER.particles})"
     )
+    run.add_argument(
+        "--least-particles", type=int, default=0, metavar="N", help="adapt their number, from N on (default: fixed)"
+    )
     run.add_argument("--resolution", type=float, default=DEFAULTS.resolution, metavar="M", help="of the map, m")
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
     run.add_argument("--intensity", action="store_true", help="use received light; writes imap.npy and imap.png, too")
@@ -70,6 +73,8 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.particles = PAPER.particles if arguments.method == "paper" else DEFAULTS.particles
     if not 1 <= arguments.particles <= 10_000:
         raise CommandError("--particles: from 1 to 10000")
+    if not 0 <= arguments.least_particles <= arguments.particles:
+        raise CommandError("--least-particles: from 1 to --particles, or 0")
     if not 0.01 <= arguments.resolution <= 0.5:
         raise CommandError("--resolution: from 0.01 to 0.5 m")
     if arguments.seed < 0:
@@ -85,6 +90,7 @@ def _run(arguments: argparse.Namespace) -> int:
     numba.set_num_threads(arguments.threads or cores)
     settings = Settings(
         particles=arguments.particles,
+        least_particles=arguments.least_particles,
         resolution=arguments.resolution,
         seed=arguments.seed,
         people=not arguments.keep_people,

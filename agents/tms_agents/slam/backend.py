@@ -98,13 +98,16 @@ def _revisits(submaps: Submaps, path: Floats, way: Floats, drift: Drift, *, wide
             if apart[one] > _NEAR_M + window[one]:
                 continue
             thought = between(path[anchors[before[one]]], path[key])
-            questions.append(Question(int(before[one]), int(key), thought, float(window[one]), float(turn[one])))
+            questions.append(
+                Question(int(before[one]), int(key), thought, float(window[one]), float(turn[one]), widely)
+            )
             covariances.append(spreads[one])
     found = find_closures(submaps, questions)
     return [
         closure
-        for closure, covariance in zip(found, covariances, strict=True)
-        if closure is not None and drift.plausible(closure, covariance)
+        for closures, covariance in zip(found, covariances, strict=True)
+        for closure in closures
+        if drift.plausible(closure, covariance)
     ]
 
 

@@ -20,11 +20,13 @@ from tms_agents.slam.submaps import GROUP, Submaps, pyramids
 #: Points of a cloud, keys on either side that it is made of, its least mean score in a search.
 _POINTS, _AROUND, _LEAST = 300, 3, 0.5
 _TURN_STEP = 0.025
+#: Two places so far apart (m) where a cloud fits are two answers.
+_APART_M = 0.5
 #: The error of a beam (m); pyramids of so many submaps are in memory together.
 _SIGMA_M, _SEARCHED = 0.1, 4
 #: Closures within so much way (m, both ends added) should agree; a crowd is so much larger than its rivals to win,
 #: and one counts by this power of how well it fits.
-_CROWD_M, _CLEARLY, _MERIT = 60.0, 1.5, 8
+_CROWD_M, _CLEARLY, _MERIT = 60.0, 1.5, 16
 #: A match holds if so large a share of the points ends near surfaces, among those that end where the submap knows
 #: something, and so many points do;
 #: near is within so many m.
@@ -49,29 +51,32 @@ class Closure:
 @dataclass(frozen=True, slots=True, eq=False)
 class Question:
     """Did key scan ``key`` come back to submap ``number``? It is ``thought`` (3,) to be there, seen from its anchor,
-    wrong by up to ``window`` m and ``turn`` rad."""
+    wrong by up to ``window`` m and ``turn`` rad. The whole window is searched where nothing near by fits, or
+    ``anyway``: a filter that locked onto a corridor one door off fits near by, too."""
 
     number: int
     key: int
     thought: Floats
     window: float
     turn: float
+    anyway: bool = False
 
 
-def find_closures(submaps: Submaps, questions: Sequence[Question]) -> list[Closure | None]:
-    """Compare key scans with submaps, side by side: near by first, then in the whole window."""
-    found: list[Closure | None] = [None] * len(questions)
+def find_closures(submaps: Submaps, questions: Sequence[Question]) -> list[list[Closure]]:
+    """Compare key scans with submaps, side by side: near by first, then in the whole window. None, one or two answers
+    to each question."""
+    found: list[list[Closure]] = [[] for _ in questions]
     groups: dict[int, list[int]] = {}
     for n, question in enumerate(questions):
         groups.setdefault(question.number // GROUP, []).append(n)
     for group in sorted(groups):
         asked = [questions[n] for n in groups[group]]
-        for n, closure in zip(groups[group], _answers(submaps, group, asked), strict=True):
-            found[n] = closure
+        for n, closures in zip(groups[group], _answers(submaps, group, asked), strict=True):
+            found[n] = closures
     return found
 
 
-def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[Closure | None]:
+def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[list[Closure]]:
     """Of questions about submaps of one group."""
     maps = submaps.rendered(group)
     clouds, lengths = padded([submaps.cloud(q.key, _AROUND, _POINTS) for q in questions])
@@ -79,7 +84,13 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[Cl
     thought = np.array([q.thought for q in questions])
     poses, hessians, fits = np.empty_like(thought), np.empty((len(which), 3, 3)), np.zeros(len(which))
     _refine(maps, which, clouds, lengths, thought, poses, hessians, fits)
-    for some in _few_submaps(which, np.flatnonzero((fits == 0.0) & [q.window > 0 for q in questions])):
+    found: list[list[Closure]] = [[] for _ in questions]
+    for n, question in enumerate(questions):
+        if fits[n] > 0.0:
+            cloud = clouds[n, : lengths[n]]
+            found[n] += _closure(submaps, maps, question, cloud, poses[n], hessians[n], fits[n])
+    widely = np.flatnonzero([q.window > 0 and (q.anyway or not found[n]) for n, q in enumerate(questions)])
+    for some in _few_submaps(which, widely):
         starts, scores = np.empty((len(some), 3)), np.empty(len(some))
         searched, place = np.unique(which[some], return_inverse=True)
         levels, origin, scale = pyramids(maps, searched, _SIGMA_M)
@@ -91,11 +102,10 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[Cl
         hit = some[scores > 0.0]
         again = np.empty((len(hit), 3)), np.empty((len(hit), 3, 3)), np.zeros(len(hit))
         _refine(maps, which[hit], clouds[hit], lengths[hit], starts[scores > 0.0], *again)
-        poses[hit], hessians[hit], fits[hit] = again
-    return [
-        _closure(submaps, maps, q, clouds[n, : lengths[n]], poses[n], hessians[n], fits[n]) if fits[n] > 0.0 else None
-        for n, q in enumerate(questions)
-    ]
+        for n, pose, hessian, fit in zip(hit, *again, strict=True):
+            if fit > 0.0 and (not found[n] or np.hypot(*(pose - poses[n])[:2]) > _APART_M):
+                found[n] += _closure(submaps, maps, questions[n], clouds[n, : lengths[n]], pose, hessian, fit)
+    return found
 
 
 def _few_submaps(which: Ints, asked: Indices) -> Iterator[Indices]:
@@ -107,19 +117,20 @@ def _few_submaps(which: Ints, asked: Indices) -> Iterator[Indices]:
 
 def _closure(
     submaps: Submaps, maps: Maps, question: Question, cloud: Floats, pose: Floats, hessian: Floats, fit: float
-) -> Closure | None:
+) -> list[Closure]:
+    """What geometry found, or geometry and light together; none if light contradicts."""
     if submaps.light is not None:
         which = question.number % GROUP
         placed = submaps.light.placed(
             question.number, question.key, _AROUND, maps, which, cloud, pose, hessian, question.window
         )
         if placed is None or not _agrees(maps, which, cloud, placed[0]):
-            return None
+            return []
         pose, hessian = placed
     covariance = np.linalg.inv(hessian) * _WITNESSES + np.diag(np.square(_FLOOR))
     shift = float(np.hypot(*(pose - question.thought)[:2]))
     anchor = int(submaps.anchors[question.number])
-    return Closure(anchor, question.key, pose, np.linalg.inv(covariance), float(fit), shift)
+    return [Closure(anchor, question.key, pose, np.linalg.inv(covariance), float(fit), shift)]
 
 
 def _agrees(maps: Maps, which: int, cloud: Floats, pose: Floats) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from tms_agents.slam.ancestry import Ancestry
 from tms_agents.slam.geometry import Floats, between, compose
+from tms_agents.slam.kld import enough
 from tms_agents.slam.light.filtering import ParticleLight
 from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.maps import Maps
@@ -89,9 +90,13 @@ class ParticleFilter:
         weights = normalised(self.log_weights)
         self.effective = effective_number(weights)
         uniform = float(self._random.random())
-        if self.effective >= self.settings.resample_below * len(weights):
+        s, count = self.settings, len(weights)
+        if s.least_particles:
+            count = enough(self.poses, min(s.least_particles, s.particles), s.particles)
+        # Fewer than half are enough, or twice as many are wanted: then the number changes, too.
+        if self.effective >= s.resample_below * len(weights) and len(weights) < 2 * count < 4 * len(weights):
             return
-        parents = low_variance(weights, len(weights), uniform)
+        parents = low_variance(weights, count, uniform)
         self.poses = self.poses[parents]
         self.log_weights = np.zeros(len(parents))
         self.maps.resample(parents)

@@ -25,9 +25,7 @@ _DEVIATIONS = 5.0
 _BEFORE, _CLEARLY = 8, 0.05
 
 
-def mended(
-    path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None
-) -> Floats:
+def mended(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Floats:
     """``path`` (K, 3) with its jumps taken back where the scans before contradict them; what follows moves along."""
     steps, motions = between(path[:-1], path[1:]), between(keys.odometry[:-1], keys.odometry[1:])
     off = steps - motions

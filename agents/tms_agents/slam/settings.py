@@ -12,6 +12,8 @@ class Settings:
     """Of the particle filter. Lengths in m, angles in rad."""
 
     particles: int = 30
+    #: As many as their spread asks for, from this number to ``particles``; 0: always ``particles``.
+    least_particles: int = 0
     resolution: float = 0.05
     seed: int = 0
     #: A scan is processed once the robot has moved or turned so far since the last one.
