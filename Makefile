@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-localise faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-localise bench-light faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -17,6 +17,7 @@ help:
 	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
 	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
 	@echo "make bench-localise  localisation from anywhere in known maps (LOCALISE='--worlds intel')"
+	@echo "make bench-light    received light in mapping, on simulated places (LIGHT='--places corridor')"
 	@echo "make faults    the long fault tests (30 kills and more)"
 	@echo "make peers     tests against programs of other people (installs tshark)"
 	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
@@ -58,6 +59,9 @@ bench-slam: $(READY)
 
 bench-localise: $(READY)
 	$(BIN)/python benchmarks/localise.py $(LOCALISE)
+
+bench-light: $(READY)
+	$(BIN)/python benchmarks/light.py $(LIGHT)
 
 faults: $(READY)
 	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults

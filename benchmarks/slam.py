@@ -1,7 +1,7 @@
 """Laser mapping on public logs and on simulated buildings with long loops: accuracy over seeds, CPU time, memory.
 
     python benchmarks/slam.py                          all tables (an hour on one core)
-    python benchmarks/slam.py --only logs --seeds 3    logs, particles, buildings or threads
+    python benchmarks/slam.py --only logs --seeds 3    logs, particles, buildings, people or threads
     python benchmarks/slam.py --only logs --logs intel
 
 The public logs are read from the shared data folder (`TMS_SHARED_DATA`); docs/slam.md says where they come from. Every
@@ -24,14 +24,16 @@ from pathlib import Path
 
 import numba
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
-from tms_agents.simulation.building import PLANS, Drive, carmen, drive
-from tms_agents.slam import Log, Settings, build_map, read_log
+from tms_agents.simulation.building import PLANS, Drive, Driven, carmen, drive
+from tms_agents.slam import Log, Result, Settings, build_map, read_log
 from tms_agents.slam.filter import ParticleFilter
-from tms_agents.slam.geometry import Floats, between
+from tms_agents.slam.geometry import Floats, between, transform
 from tms_agents.slam.keyframes import key_scans, poses_of_all
 from tms_agents.slam.logs_carmen import parse_carmen
 from tms_agents.slam.metric import agreement_with, read_relations
+from tms_agents.slam.witnesses import people_by_path
 
 DATA = Path(os.environ.get("TMS_SHARED_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")) / "slam"
 #: Name of the log -> its relations, and what they are.
@@ -74,11 +76,13 @@ class Outcome:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", choices=("logs", "particles", "buildings", "threads"))
+    parser.add_argument("--only", choices=("logs", "particles", "buildings", "people", "threads"))
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--logs", default=",".join(LOGS), help="comma separated")
     parser.add_argument("--jobs", type=int, default=1, help="processes side by side")
     args = parser.parse_args(arguments)
+    seeds = range(args.first, args.first + args.seeds)
     if unknown := set(args.logs.split(",")) - set(LOGS):
         parser.error(f"no log {', '.join(unknown)}; there are {', '.join(LOGS)}")
     here = [name for name in args.logs.split(",") if (DATA / f"{name}.log.gz").exists()]
@@ -88,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with ProcessPoolExecutor(args.jobs, mp_context=spawn, max_tasks_per_child=1) as pool:
         pool.submit(run, Job("block good", 0)).result()  # compiles what is not compiled yet
         if args.only in (None, "logs"):
-            over_seeds(pool, here, args.seeds)
+            over_seeds(pool, here, seeds)
         if args.only in (None, "particles") and "intel" in here:
             print("## Particles (Intel, seed 0)\n\n" + HEADER)
             for outcome in pool.map(run, [Job("intel", 0, particles) for particles in PARTICLES]):
@@ -101,7 +105,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 print(f"| {threads} | {one.wall_s:.1f} | {one.all_ms:.1f} |", flush=True)
             print()
         if args.only in (None, "buildings"):
-            over_seeds(pool, [f"{plan} {wheels}" for plan in PLANS for wheels in WHEELS], args.seeds)
+            over_seeds(
+                pool,
+                [f"{plan} {wheels}" for plan in PLANS for wheels in WHEELS],
+                seeds,
+            )
+        if args.only in (None, "people"):
+            with_people(pool, seeds)
 
 
 HEADER = (
@@ -110,11 +120,11 @@ HEADER = (
 )
 
 
-def over_seeds(pool: ProcessPoolExecutor, worlds: Iterable[str], seeds: int) -> None:
+def over_seeds(pool: ProcessPoolExecutor, worlds: Iterable[str], seeds: range) -> None:
     """A line per world."""
-    print(f"## 30 particles, {seeds} seeds\n\n{HEADER}")
+    print(f"## 30 particles, {len(seeds)} seeds\n\n{HEADER}")
     for world in worlds:
-        print(_row(world, list(pool.map(run, [Job(world, seed) for seed in range(seeds)]))), flush=True)
+        print(_row(world, list(pool.map(run, [Job(world, seed) for seed in seeds]))), flush=True)
     print()
 
 
@@ -126,6 +136,62 @@ def _row(name: str, found: list[Outcome]) -> str:
         f"| {np.mean([o.filter_ms for o in found]):.1f} | {np.mean([o.all_ms for o in found]):.1f} "
         f"| {np.mean([o.span_s / o.wall_s for o in found]):.0f} | {max(o.above_mb for o in found):.0f} |"
     )
+
+
+#: Building, people per 10 m of way, legs or bodies.
+CROWDS = (("block", 2.0, True), ("block", 2.0, False), ("block", 5.0, False), ("ring", 3.0, False))
+
+
+def with_people(pool: ProcessPoolExecutor, seeds: range) -> None:
+    """A line per building and crowd: people kept out or not."""
+    print(f"## People in the way, seeds {seeds.start} to {seeds.stop - 1}\n")
+    print(
+        "| building, people | beams on people | found | wall beams dropped | error m (worst) | people kept m (worst) "
+        "| cells of people left | people kept |\n|---|---|---|---|---|---|---|---|"
+    )
+    for crowd in CROWDS:
+        rows = np.array(list(pool.map(run_crowd, [(*crowd, seed) for seed in seeds])))
+        beams, recall, wrong, error, kept, cells, before = rows.T
+        print(
+            f"| {crowd[0]}, {crowd[1]:g} {'legs' if crowd[2] else 'bodies'} per 10 m | {beams.mean():.1%} "
+            f"| {recall.mean():.1%} | {wrong.mean():.3%} | {error.mean():.3f} ({error.max():.3f}) "
+            f"| {kept.mean():.3f} ({kept.max():.3f}) | {cells.mean():.0f} | {before.mean():.0f} |",
+            flush=True,
+        )
+    print()
+
+
+def run_crowd(world: tuple[str, float, bool, int]) -> tuple[float, ...]:
+    """(share of beams on people, share of those found, share of others dropped, error m with people left out and with
+    people kept, occupied cells where people were met and no wall is near, with people left out and kept)."""
+    plan, people, legs, seed = world
+    numba.set_num_threads(1)
+    driven = drive(plan, Drive(seed=seed, step_m=0.5, step_rad=0.3, people=people, legs=legs))
+    log, relations = parse_carmen(carmen(driven)), _relations(driven.t, driven.truth)
+    errors, cells = [], []
+    for keep in (False, True):
+        result = build_map(log, Settings(seed=seed, people=not keep))
+        errors.append(agreement_with(relations, np.column_stack([log.t, result.poses])).translation)
+        cells.append(_cells_of_people(driven, log, result))
+        if not keep:
+            scans = [log.points(int(n)) for n in result.keys]
+            found = np.concatenate(people_by_path(log, result.keys, scans, result.filtered))
+    truth = np.concatenate([driven.people[n][log.returned(int(n))] for n in result.keys])
+    return float(truth.mean()), float(found[truth].mean()), float(found[~truth].mean()), *errors, *cells
+
+
+def _cells_of_people(driven: Driven, log: Log, result: Result) -> int:
+    """Occupied cells in which people were met, and farther than 0.15 m from where a beam ended on a wall."""
+    occupied = result.grid.probabilities() > 0.65
+    met, walls = np.zeros_like(occupied), np.ones_like(occupied)
+    for n in result.keys:
+        places = (transform(result.poses[n], log.points(int(n))) - result.grid.origin) / result.grid.resolution
+        x, y = np.floor(places).astype(int).T
+        inside = (x >= 0) & (y >= 0) & (x < occupied.shape[1]) & (y < occupied.shape[0])
+        who = driven.people[n][log.returned(int(n))]
+        met[y[inside & who], x[inside & who]] = True
+        walls[y[inside & ~who], x[inside & ~who]] = False
+    return int(np.count_nonzero(occupied & met & (distance_transform_edt(walls) > 3)))
 
 
 def run(job: Job) -> Outcome:

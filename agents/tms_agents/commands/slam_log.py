@@ -10,12 +10,16 @@ from pathlib import Path
 import numba
 import numpy as np
 
-from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
+from tms_agents.bags import is_bag, read_messages
+from tms_agents.slam.logs import Log, parse_laser, read_log
+from tms_agents.slam.logs_ros import TYPES, parse_messages
 from tms_client.cli import CommandError
 
 
 def add_log_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl; each may be .gz")
+    parser.add_argument(
+        "log", type=Path, metavar="LOG", help="CARMEN .log or .clf, recording .jsonl (each may be .gz), ROS bag"
+    )
     parser.add_argument(
         "--models", type=Path, metavar="MODELS.json", help="laser pose (default: models.json beside LOG)"
     )
@@ -30,12 +34,12 @@ def read(arguments: argparse.Namespace) -> Log:
 def load(path: Path, models: Path | None) -> Log:
     """A log, with the laser where ``models`` says. Raises ``CommandError``."""
     try:
-        log = read_log(path)
+        log = parse_messages(read_messages(path, TYPES)) if is_bag(path) else read_log(path)
         if models is not None:
             log = replace(log, laser=parse_laser(models.read_text()))
     except OSError as error:
         raise CommandError(f"{error.filename or path}: {error.strerror or error}") from error
-    except LogError as error:
+    except ValueError as error:
         raise CommandError(f"{path}: {error}") from error
     if log.bad_lines:
         sys.stderr.write(f"{path}: {log.bad_lines} lines could not be read and were left out\n")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tms_agents.bags import is_bag
 from tms_agents.devices.scans import Array, Scan, Sweep
 from tms_client.cli import CommandError
 
@@ -108,7 +109,7 @@ def _read(path: Path) -> list[Recorded]:
         from tms_agents.floor.recording import read_recording
 
         return read_recording(path)
-    if kind in (".bag", ".db3", ".mcap") or path.is_dir():
+    if is_bag(path):
         from tms_agents.floor.formats_rosbag import read_rosbag
 
         return read_rosbag(path)

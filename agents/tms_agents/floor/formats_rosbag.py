@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from tms_agents.bags import read_messages
 from tms_agents.devices.scans import Sweep
 from tms_agents.floor.formats import Recorded, clean_ranges
-from tms_client.cli import CommandError
-
-_TYPE = "sensor_msgs/msg/LaserScan"
 
 
 def read_rosbag(path: Path) -> list[Recorded]:
@@ -24,33 +22,7 @@ def read_rosbag(path: Path) -> list[Recorded]:
         ValueError: the bag is damaged, or a topic changes what a scan looks like.
         OSError: it cannot be read.
     """
-    try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
-        from rosbags.rosbag1 import ReaderError as Ros1Error
-        from rosbags.rosbag2 import ReaderError as Ros2Error
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise CommandError(f'{path}: reading ROS bags needs pip install "robot-town-tms[rosbags]"') from error
-    bag = _bag(path)
-    bag.stat()
-    # Bags of ROS 2 do not always describe their messages; this one never changed.
-    known = get_typestore(Stores.ROS2_HUMBLE)
-    topics: dict[str, list[Any]] = {}
-    try:
-        with AnyReader([bag], default_typestore=known) as reader:
-            wanted = [one for one in reader.connections if one.msgtype == _TYPE]
-            for connection, _, raw in reader.messages(connections=wanted) if wanted else ():
-                topics.setdefault(connection.topic, []).append(reader.deserialize(raw, connection.msgtype))
-    except (AnyReaderError, Ros1Error, Ros2Error) as error:
-        raise ValueError(f"the bag cannot be read: {error}") from error
-    return list(_recordings(topics))
-
-
-def _bag(path: Path) -> Path:
-    """What the reader wants to open: of a ROS 2 bag, the folder with its metadata."""
-    if path.suffix.lower() in (".db3", ".mcap") and (path.parent / "metadata.yaml").is_file():
-        return path.parent
-    return path
+    return list(_recordings(read_messages(path, ["sensor_msgs/msg/LaserScan"])))
 
 
 def _recordings(topics: dict[str, list[Any]]) -> Iterator[Recorded]:

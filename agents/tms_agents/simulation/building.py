@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tms_agents.simulation.floor_world.raycaster import cast
-from tms_agents.simulation.floor_world.shapes import Shapes
+from tms_agents.simulation.floor_world.shapes import NOBODY, Shapes
+from tms_agents.simulation.passers import passers
 
 Floats = NDArray[np.float64]
 #: What the laser says where nothing comes back (m).
 NO_RETURN = 81.83
+_PERSON = 0
 Rectangle = tuple[float, float, float, float]
 
 
@@ -27,6 +29,8 @@ class Drive:
 
     The wheels: deviation of the turn per root of m driven (rad) and per rad, its constant part per m, deviation of the
     way per root of m. The laser: noise and longest range (m), share of beams that are lost.
+
+    ``people`` are met per 10 m of way, seen as ``legs`` or as bodies.
     """
 
     seed: int = 0
@@ -43,12 +47,14 @@ class Drive:
     noise_m: float = 0.015
     range_max: float = 50.0
     lost: float = 0.02
+    people: float = 0.0
+    legs: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Driven:
     """``t`` (S,) s, ``truth`` and ``odometry`` (S, 3), ``ranges`` (S, B) m (`NO_RETURN` where none) at ``angles``
-    (B,)."""
+    (B,); ``people`` (S, B) which beams met a person."""
 
     t: Floats
     truth: Floats
@@ -56,6 +62,7 @@ class Driven:
     ranges: Floats
     angles: Floats
     walls: Floats
+    people: NDArray[np.bool_]
 
 
 #: Corners of the corridors' middle lines, and the way through them.
@@ -108,17 +115,21 @@ def drive(plan: str, how: Drive) -> Driven:
     corners, corridors, way = PLANS[plan]
     points = np.array(corners, dtype=np.float64)
     walls = edges(_rectangles(points, corridors, how, random))
-    fine = _path(points[way], how, random)
+    fine = path_through(points[way], random)
     truth, odometry = _rolled(fine, how, random)
     angles = -np.pi / 2 + np.pi / 180 * np.arange(180.0)
-    shapes = _shapes(walls)
-    ranges = np.empty((len(truth), 180))
+    t = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T) + 0.2)]) / 0.5
+    # People are drawn apart: the same building and drive with and without them.
+    around = passers(t, truth, how.people, how.legs, np.random.default_rng([how.seed, 1]))
+    ranges, people = np.empty((len(truth), 180)), np.zeros((len(truth), 180), dtype=bool)
     for n, pose in enumerate(truth):
-        met = cast(shapes, (pose[0], pose[1], pose[2]), float(angles[0]), np.pi / 180, 180, 0.0).ranges
-        noisy = np.round(met + random.normal(0, how.noise_m, 180), 2)
-        ranges[n] = np.where((met < how.range_max) & (random.uniform(0.0, 1.0, 180) >= how.lost), noisy, NO_RETURN)
-    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T) + 0.2)])
-    return Driven(driven / 0.5, truth, odometry, ranges, angles, walls)
+        circles = np.concatenate([np.zeros((0, 3)), *(one.circles(float(t[n])) for one in around)])
+        met = cast(_shapes(walls, circles), (pose[0], pose[1], pose[2]), float(angles[0]), np.pi / 180, 180, 0.0)
+        noisy = np.round(met.ranges + random.normal(0, how.noise_m, 180), 2)
+        returned = (met.ranges < how.range_max) & (random.uniform(0.0, 1.0, 180) >= how.lost)
+        ranges[n] = np.where(returned, noisy, NO_RETURN)
+        people[n] = returned & (met.owners == _PERSON)
+    return Driven(t, truth, odometry, ranges, angles, walls, people)
 
 
 def edges(rectangles: list[Rectangle]) -> Floats:
@@ -175,7 +186,7 @@ def _beside(middle: float, half: float, edge: float, deep: float, along: int) ->
     return near, middle - half, far, middle + half
 
 
-def _path(corners: Floats, how: Drive, random: np.random.Generator) -> Floats:
+def path_through(corners: Floats, random: np.random.Generator) -> Floats:
     """(F, 3) poses every few centimetres, corners cut, weaving a little; where the way turns back, on the spot."""
     pieces = [corners[:1]]
     for a, b in itertools.pairwise(corners):
@@ -223,11 +234,15 @@ def _rolled(fine: Floats, how: Drive, random: np.random.Generator) -> tuple[Floa
     return np.array(truth), np.array(odometry)
 
 
-def _shapes(walls: Floats) -> Shapes:
+def _shapes(walls: Floats, people: Floats) -> Shapes:
     still = np.column_stack([walls, np.zeros((len(walls), 2))])
-    owners = np.full(len(walls), -1, dtype=np.int64)
     return Shapes(
-        still, owners, np.zeros((len(walls), 3)), np.zeros((0, 5)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        still,
+        np.full(len(walls), NOBODY, dtype=np.int64),
+        np.zeros((len(walls), 3)),
+        np.column_stack([people, np.zeros((len(people), 2))]),
+        np.full(len(people), _PERSON, dtype=np.int64),
+        np.zeros((len(people), 3)),
     )
 
 

@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tms_agents.slam.closures import Closure, consistent, find_closure
+from tms_agents.slam.closures import Closure, Question, consistent, find_closures
 from tms_agents.slam.geometry import Floats, between, wrapped
-from tms_agents.slam.matching import linearise
+from tms_agents.slam.keyframes import KeyScans
+from tms_agents.slam.light.scans import LightScan
+from tms_agents.slam.maps import padded
+from tms_agents.slam.matching import curvatures
 from tms_agents.slam.mending import mended
 from tms_agents.slam.posegraph import Edges, Indices, optimise
 from tms_agents.slam.settings import Settings
-from tms_agents.slam.submaps import Submaps
+from tms_agents.slam.submaps import GROUP, Submaps
 
 #: A place counts as visited again after so much way; submaps are asked whose anchor may be so near (m).
 _GAP_M, _NEAR_M = 25.0, 8.0
@@ -40,39 +43,24 @@ class Closed:
     moved: float
 
 
-def close_loops(
-    path: Floats,
-    odometry: Floats,
-    driven: Floats,
-    scans: Sequence[Floats],
-    laser: Floats,
-    settings: Settings,
-) -> Closed:
-    """``path``, ``odometry`` (K, 3), ``driven`` (K, 2) and ``scans`` of the key scans, ``laser`` (2,)."""
-    again = mended(path, odometry, driven, scans, laser, settings)
-    closed = _closed(path, odometry, driven, scans, laser, settings)
+def close_loops(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Closed:
+    """``path`` (K, 3) of the robot at the key scans, bent until revisits fit, by their ``lights``, too."""
+    again = mended(path, keys, settings, lights)
+    closed = _closed(path, keys, settings, lights)
     if np.allclose(again, path, atol=1e-6):
         return closed
     # Whether a jump of the filter was right is seen best by how many revisits fit in then.
-    other = _closed(again, odometry, driven, scans, laser, settings)
+    other = _closed(again, keys, settings, lights)
     if other.believed - other.rejected <= closed.believed - closed.rejected:
         return closed
     return replace(other, moved=float(np.hypot(*(other.path - path)[:, :2].T).max()))
 
 
-def _closed(
-    path: Floats,
-    odometry: Floats,
-    driven: Floats,
-    scans: Sequence[Floats],
-    laser: Floats,
-    settings: Settings,
-) -> Closed:
+def _closed(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None) -> Closed:
     """Round by round, from one path."""
-    way = driven[:, 0] - driven[0, 0]
-    laser = np.ascontiguousarray(laser)
-    submaps = Submaps(path, driven, scans, laser, settings)
-    chain = _chain(submaps, odometry, driven, scans, settings)
+    way = keys.driven[:, 0] - keys.driven[0, 0]
+    submaps = Submaps(path, keys, settings, lights)
+    chain = _chain(submaps, keys, settings)
     drift = Drift(path, chain)
     found, believed, rejected = path, 0, 0
     for turn in range(_ROUNDS):
@@ -95,27 +83,32 @@ def _closed(
 
 def _revisits(submaps: Submaps, path: Floats, way: Floats, drift: Drift, *, widely: bool) -> list[Closure]:
     """Closures of query keys with submaps that were perhaps near, by ``path`` and its drift, and long before."""
-    found = []
-    queries = np.flatnonzero(np.diff((way / _QUERY_M).astype(int), prepend=-1))
+    questions, covariances = [], []
     anchors = submaps.anchors
-    for key in queries:
+    for key in np.flatnonzero(np.diff((way / _QUERY_M).astype(int), prepend=-1)):
         before = np.flatnonzero((way[key] - way[anchors] > _GAP_M) & (anchors < key))
-        covariances = drift.between(anchors[before], np.full(len(before), key))
+        spreads = drift.between(anchors[before], np.full(len(before), key))
         window, turn = np.full(len(before), 1.0), np.full(len(before), 0.1)
         if widely:
-            spread = np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, -1])
+            spread = np.sqrt(np.linalg.eigvalsh(spreads[:, :2, :2])[:, -1])
             window = np.minimum(_WIDEST[0], _DEVIATIONS * spread)
-            turn = np.minimum(_WIDEST[1], _DEVIATIONS * np.sqrt(covariances[:, 2, 2]))
+            turn = np.minimum(_WIDEST[1], _DEVIATIONS * np.sqrt(spreads[:, 2, 2]))
         apart = np.hypot(*(path[anchors[before], :2] - path[key, :2]).T)
         for one in np.argsort(apart - 0.5 * window, kind="stable")[:_ASKED]:
             if apart[one] > _NEAR_M + window[one]:
                 continue
-            number = int(before[one])
-            thought = between(path[anchors[number]], path[key])
-            closure = find_closure(submaps, number, int(key), thought, float(window[one]), float(turn[one]))
-            if closure is not None and drift.plausible(closure, covariances[one]):
-                found.append(closure)
-    return found
+            thought = between(path[anchors[before[one]]], path[key])
+            questions.append(
+                Question(int(before[one]), int(key), thought, float(window[one]), float(turn[one]), widely)
+            )
+            covariances.append(spreads[one])
+    found = find_closures(submaps, questions)
+    return [
+        closure
+        for closures, covariance in zip(found, covariances, strict=True)
+        for closure in closures
+        if drift.plausible(closure, covariance)
+    ]
 
 
 class Drift:
@@ -162,28 +155,35 @@ def _edges(closures: list[Closure]) -> Edges:
     )
 
 
-def _chain(submaps: Submaps, odometry: Floats, driven: Floats, scans: Sequence[Floats], settings: Settings) -> Edges:
+def _chain(submaps: Submaps, keys: KeyScans, settings: Settings) -> Edges:
     """From key to key as the filter found it, as sure as each scan is in its submap together with odometry."""
     path = submaps.path
     seen = between(path[:-1], path[1:])
-    information = np.empty((len(seen), 3, 3))
-    noise = settings.noise.covariance(between(odometry[:-1], odometry[1:]), np.diff(driven, axis=0))
-    gradient, result = np.empty(3), np.empty(3)
-    for k in range(1, len(path)):
-        submap = submaps.rendered(submaps.of(k))
-        pose = between(path[submap.anchor], path[k])
-        turned = _rotations(path[k - 1 : k, 2] - path[submap.anchor, 2])[0]
-        prior = turned @ np.linalg.inv(noise[k - 1]) @ turned.T
-        hessian = np.empty((3, 3))
-        maps = submap.maps
-        linearise(
-            maps.distance.directory[0], maps.distance.cells, maps.metres, maps.frame, scans[k], pose, pose,
-            prior * _WITNESSES, settings.sigma_m, 1.0, hessian, gradient, result,
+    motions = between(keys.odometry[:-1], keys.odometry[1:])
+    noise = settings.noise.covariance(motions, np.diff(keys.driven, axis=0))
+    numbers = np.arange(1, len(path))
+    number = submaps.of(numbers)
+    anchors = submaps.anchors[number]
+    turned = _rotations(path[numbers - 1, 2] - path[anchors, 2])
+    back = turned.swapaxes(1, 2)
+    hessians = np.empty((len(seen), 3, 3))
+    for group in np.unique(number // GROUP):
+        mine = np.flatnonzero(number // GROUP == group)
+        maps = submaps.rendered(int(group))
+        points, lengths = padded([keys.scans[int(k)] for k in numbers[mine]])
+        found = np.empty((len(mine), 3, 3))
+        curvatures(
+            maps.distance.directory, maps.distance.cells, maps.metres, maps.frame,
+            (number[mine] - GROUP * group).astype(np.int32), points, lengths,
+            between(path[anchors[mine]], path[numbers[mine]]),
+            _WITNESSES * (turned[mine] @ np.linalg.inv(noise[mine]) @ back[mine]), settings.sigma_m, found,
         )  # fmt: skip
-        covariance = turned.T @ np.linalg.inv(hessian) @ turned * _WITNESSES + np.diag(np.square(_FLOOR))
-        information[k - 1] = np.linalg.inv(covariance)
-    keys = np.arange(len(path))
-    return Edges(keys[:-1], keys[1:], seen, information)
+        hessians[mine] = found
+        if submaps.light is not None:
+            for k in mine:
+                submaps.light.add(int(number[k]), int(numbers[k]), hessians[k])
+    covariance = _WITNESSES * (back @ np.linalg.inv(hessians) @ turned) + np.diag(np.square(_FLOOR))
+    return Edges(np.arange(len(seen)), numbers, seen, np.linalg.inv(covariance))
 
 
 def _rotations(angles: Floats) -> Floats:

@@ -10,27 +10,73 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from tms_agents.slam.geometry import Bytes, Floats, Ints
+from tms_agents.slam.tiles import MASK, SHIFT, SIDE
 
 LEVELS = 6
 
 
-def pyramid(scores: Bytes) -> Bytes:
-    """(LEVELS, H + pad, W + pad) of ``scores`` (H, W), 255 = best; pad = 2^(LEVELS-1) cells of zeros below and to the
-    left."""
-    pad = 1 << (LEVELS - 1)
-    height, width = scores.shape
-    levels = np.zeros((LEVELS, height + pad, width + pad), dtype=np.uint8)
-    levels[0, pad:, pad:] = scores
-    for h in range(1, LEVELS):
-        half = 1 << (h - 1)
-        levels[h] = levels[h - 1]
-        np.maximum(levels[h, :-half], levels[h - 1, half:], out=levels[h, :-half])
-        sideways = levels[h].copy()
-        np.maximum(levels[h, :, :-half], sideways[:, half:], out=levels[h, :, :-half])
-    return levels
+@njit(cache=True, parallel=True)
+def fill_pyramids(directory: Ints, squared: Bytes, scores: Bytes, pool: int, levels: Bytes) -> None:
+    """Pyramids of N distance fields, tiles (N, H, W), into ``levels`` (N, LEVELS, H' + pad, W' + pad) of zeros.
+
+    Cells of level 0 are ``pool`` x ``pool`` of the field, with the best of their ``scores`` (256,) by squared distance
+    in cells, 255 = best; pad = 2^(LEVELS-1) cells below and to the left stay 0.
+    """
+    pad = 1 << (levels.shape[1] - 1)
+    for n in prange(len(directory)):
+        for ty in range(directory.shape[1]):
+            for tx in range(directory.shape[2]):
+                tile = directory[n, ty, tx]
+                if tile == 0:
+                    continue
+                for place in range(SIDE * SIDE):
+                    score = scores[squared[tile, place]]
+                    y = pad + ((ty << SHIFT) + (place >> SHIFT)) // pool
+                    x = pad + ((tx << SHIFT) + (place & MASK)) // pool
+                    if score > levels[n, 0, y, x]:
+                        levels[n, 0, y, x] = score
+        for h in range(1, levels.shape[1]):
+            _coarser(levels[n, h - 1], 1 << (h - 1), levels[n, h])
+
+
+@njit(cache=True)
+def _coarser(fine: Bytes, half: int, coarse: Bytes) -> None:
+    """The best of each cell and those ``half`` cells above, to the right, and both."""
+    height, width = fine.shape
+    for y in range(height):
+        up = min(y + half, height - 1)
+        for x in range(width):
+            coarse[y, x] = max(fine[y, x], fine[up, x]) if y + half < height else fine[y, x]
+        for x in range(width - half):
+            coarse[y, x] = max(coarse[y, x], coarse[y, x + half])
+
+
+@njit(cache=True, parallel=True)
+def best_poses(
+    levels: Bytes,
+    which: Ints,
+    origin: Floats,
+    scale: float,
+    clouds: Floats,
+    lengths: Ints,
+    centres: Floats,
+    windows: Floats,
+    turns: Floats,
+    turn_step: float,
+    least: float,
+    found: Floats,
+    scores: Floats,
+) -> None:
+    """`best_pose` of clouds (A, M, 2), of which the first ``lengths`` (A,) points count, in pyramid ``which[a]`` each;
+    ``found`` (A, 3) and ``scores`` (A,) are written."""
+    for a in prange(len(which)):
+        scores[a] = best_pose(
+            levels[which[a]], origin, scale, clouds[a, : lengths[a]], centres[a], windows[a], turns[a], turn_step,
+            least, found[a],
+        )  # fmt: skip
 
 
 @njit(cache=True)

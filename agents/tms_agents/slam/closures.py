@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from tms_agents.slam.agreement import agreement
-from tms_agents.slam.branch_and_bound import best_pose
-from tms_agents.slam.geometry import Floats, between, compose, inverse, wrapped
+from tms_agents.slam.branch_and_bound import best_poses
+from tms_agents.slam.geometry import Bytes, Floats, Ints, between, compose, inverse, wrapped
+from tms_agents.slam.keyframes import Indices
+from tms_agents.slam.maps import Maps, padded
 from tms_agents.slam.matching import SHARE, match
-from tms_agents.slam.submaps import Submap, Submaps
+from tms_agents.slam.submaps import GROUP, Submaps, pyramids
 
 #: Points of a cloud, keys on either side that it is made of, its least mean score in a search.
 _POINTS, _AROUND, _LEAST = 300, 3, 0.5
 _TURN_STEP = 0.025
+#: Two places so far apart (m) where a cloud fits are two answers.
+_APART_M = 0.5
+#: The error of a beam (m); pyramids of so many submaps are in memory together.
+_SIGMA_M, _SEARCHED = 0.1, 4
 #: Closures within so much way (m, both ends added) should agree; a crowd is so much larger than its rivals to win,
 #: and one counts by this power of how well it fits.
-_CROWD_M, _CLEARLY, _MERIT = 60.0, 1.5, 8
+_CROWD_M, _CLEARLY, _MERIT = 60.0, 1.5, 16
 #: A match holds if so large a share of the points ends near surfaces, among those that end where the submap knows
 #: something, and so many points do;
 #: near is within so many m.
@@ -40,47 +48,149 @@ class Closure:
     shift: float
 
 
-def find_closure(
-    submaps: Submaps, number: int, key: int, thought: Floats, window: float, turn: float
-) -> Closure | None:
-    """Compare key scan ``key``, ``thought`` (3,) to be there, with a submap: near by first, then in the whole
-    window."""
-    submap = submaps.rendered(number)
-    cloud = submaps.cloud(key, _AROUND, _POINTS)
-    there = _refined(submap, cloud, thought)
-    if there is None and window > 0:
-        found = np.empty(3)
-        score = best_pose(
-            submaps.levels(number), submap.origin, submap.scale, cloud, thought, window, turn, _TURN_STEP, _LEAST, found
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """Did key scan ``key`` come back to submap ``number``? It is ``thought`` (3,) to be there, seen from its anchor,
+    wrong by up to ``window`` m and ``turn`` rad. The whole window is searched where nothing near by fits, or
+    ``anyway``: a filter that locked onto a corridor one door off fits near by, too."""
+
+    number: int
+    key: int
+    thought: Floats
+    window: float
+    turn: float
+    anyway: bool = False
+
+
+def find_closures(submaps: Submaps, questions: Sequence[Question]) -> list[list[Closure]]:
+    """Compare key scans with submaps, side by side: near by first, then in the whole window. None, one or two answers
+    to each question."""
+    found: list[list[Closure]] = [[] for _ in questions]
+    groups: dict[int, list[int]] = {}
+    for n, question in enumerate(questions):
+        groups.setdefault(question.number // GROUP, []).append(n)
+    for group in sorted(groups):
+        asked = [questions[n] for n in groups[group]]
+        for n, closures in zip(groups[group], _answers(submaps, group, asked), strict=True):
+            found[n] = closures
+    return found
+
+
+def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[list[Closure]]:
+    """Of questions about submaps of one group."""
+    maps = submaps.rendered(group)
+    clouds, lengths = padded([submaps.cloud(q.key, _AROUND, _POINTS) for q in questions])
+    which: Ints = np.array([q.number - GROUP * group for q in questions], dtype=np.int32)
+    thought = np.array([q.thought for q in questions])
+    poses, hessians, fits = np.empty_like(thought), np.empty((len(which), 3, 3)), np.zeros(len(which))
+    _refine(maps, which, clouds, lengths, thought, poses, hessians, fits)
+    found: list[list[Closure]] = [[] for _ in questions]
+    for n, question in enumerate(questions):
+        if fits[n] > 0.0:
+            cloud = clouds[n, : lengths[n]]
+            found[n] += _closure(submaps, maps, question, cloud, poses[n], hessians[n], fits[n])
+    widely = np.flatnonzero([q.window > 0 and (q.anyway or not found[n]) for n, q in enumerate(questions)])
+    for some in _few_submaps(which, widely):
+        starts, scores = np.empty((len(some), 3)), np.empty(len(some))
+        searched, place = np.unique(which[some], return_inverse=True)
+        levels, origin, scale = pyramids(maps, searched, _SIGMA_M)
+        best_poses(
+            levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
+            np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
+            _TURN_STEP, _LEAST, starts, scores,
+        )  # fmt: skip
+        hit = some[scores > 0.0]
+        again = np.empty((len(hit), 3)), np.empty((len(hit), 3, 3)), np.zeros(len(hit))
+        _refine(maps, which[hit], clouds[hit], lengths[hit], starts[scores > 0.0], *again)
+        for n, pose, hessian, fit in zip(hit, *again, strict=True):
+            if fit > 0.0 and (not found[n] or np.hypot(*(pose - poses[n])[:2]) > _APART_M):
+                found[n] += _closure(submaps, maps, questions[n], clouds[n, : lengths[n]], pose, hessian, fit)
+    return found
+
+
+def _few_submaps(which: Ints, asked: Indices) -> Iterator[Indices]:
+    """``asked`` questions in parts that are about few submaps each: their pyramids are large."""
+    numbers = np.unique(which[asked])
+    for first in range(0, len(numbers), _SEARCHED):
+        yield asked[np.isin(which[asked], numbers[first : first + _SEARCHED])]
+
+
+def _closure(
+    submaps: Submaps, maps: Maps, question: Question, cloud: Floats, pose: Floats, hessian: Floats, fit: float
+) -> list[Closure]:
+    """What geometry found, or geometry and light together; none if light contradicts."""
+    if submaps.light is not None:
+        which = question.number % GROUP
+        placed = submaps.light.placed(
+            question.number, question.key, _AROUND, maps, which, cloud, pose, hessian, question.window
         )
-        if score > 0.0:
-            there = _refined(submap, cloud, found)
-    if there is None:
-        return None
-    pose, hessian, fit = there
+        if placed is None or not _agrees(maps, which, cloud, placed[0]):
+            return []
+        pose, hessian = placed
     covariance = np.linalg.inv(hessian) * _WITNESSES + np.diag(np.square(_FLOOR))
-    shift = float(np.hypot(*(pose - thought)[:2]))
-    return Closure(submap.anchor, key, pose, np.linalg.inv(covariance), fit, shift)
+    shift = float(np.hypot(*(pose - question.thought)[:2]))
+    anchor = int(submaps.anchors[question.number])
+    return [Closure(anchor, question.key, pose, np.linalg.inv(covariance), float(fit), shift)]
 
 
-def _refined(submap: Submap, cloud: Floats, start: Floats) -> tuple[Floats, Floats, float] | None:
-    """(pose, hessian, share that fits) of the match from ``start``; None if it does not hold."""
-    maps = submap.maps
-    pose, hessian, result = np.empty(3), np.empty((3, 3)), np.empty(3)
-    loose = np.diag([1.0, 1.0, 25.0])
-    match(
-        maps.distance.directory[0], maps.distance.cells, maps.metres, maps.frame, cloud, start, start, loose, 0.1, 1.0,
-        pose, hessian, result,
-    )  # fmt: skip
-    if result[SHARE] < _KNOWN * _FITS:
-        return None
+def _agrees(maps: Maps, which: int, cloud: Floats, pose: Floats) -> bool:
     near, free = agreement(
-        maps.occupancy.directory[0], maps.occupancy.cells, maps.distance.directory[0], maps.distance.cells,
+        maps.occupancy.directory[which], maps.occupancy.cells, maps.distance.directory[which], maps.distance.cells,
         maps.metres, maps.frame, cloud, pose, _NEAR_M,
     )  # fmt: skip
-    if near < _FITS * (near + free) or near + free < _KNOWN * len(cloud):
-        return None
-    return pose, hessian, near / (near + free)
+    return near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud)
+
+
+def _refine(
+    maps: Maps,
+    which: Ints,
+    clouds: Floats,
+    lengths: Ints,
+    starts: Floats,
+    poses: Floats,
+    hessians: Floats,
+    fits: Floats,
+) -> None:
+    distance, occupancy = maps.distance, maps.occupancy
+    _refine_all(
+        distance.directory, distance.cells, maps.metres, maps.frame, occupancy.directory, occupancy.cells,
+        which, clouds, lengths, starts, poses, hessians, fits,
+    )  # fmt: skip
+
+
+@njit(cache=True, parallel=True)
+def _refine_all(
+    directory: Ints,
+    squared: Bytes,
+    metres: Floats,
+    frame: Floats,
+    occupancy_directory: Ints,
+    occupancy: Bytes,
+    which: Ints,
+    clouds: Floats,
+    lengths: Ints,
+    starts: Floats,
+    poses: Floats,
+    hessians: Floats,
+    fits: Floats,
+) -> None:
+    """Matches of clouds (A, M, 2) in maps ``which`` (A,) from ``starts`` (A, 3): ``poses``, ``hessians``, and as
+    ``fits`` (A,) the share that fits, 0 where the match does not hold."""
+    loose = np.diag(np.array([1.0, 1.0, 25.0]))
+    for a in prange(len(which)):
+        one, cloud, result = which[a], clouds[a, : lengths[a]], np.empty(3)
+        match(
+            directory[one], squared, metres, frame, cloud, starts[a], starts[a], loose, _SIGMA_M, 1.0, poses[a],
+            hessians[a], result,
+        )  # fmt: skip
+        fits[a] = 0.0
+        if result[SHARE] < _KNOWN * _FITS:
+            continue
+        near, free = agreement(
+            occupancy_directory[one], occupancy, directory[one], squared, metres, frame, cloud, poses[a], _NEAR_M
+        )
+        if near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud):
+            fits[a] = near / (near + free)
 
 
 def consistent(closures: list[Closure], path: Floats, way: Floats) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,12 @@ from PIL import Image
 
 from tms_agents.slam.geometry import Bytes, Floats
 from tms_agents.slam.gridmap import GridMap
+from tms_agents.slam.light.gridlight import GridLight
 
 OCCUPIED, FREE = 0.65, 0.196
 _COLOURS = ((0, 0, 0), (220, 30, 30), (30, 60, 220))
+#: From dark to bright, all told apart from the grey around them.
+_SHADES = ((20, 10, 70), (110, 20, 120), (200, 50, 70), (245, 130, 20), (255, 225, 60))
 _GREY = {"free": 254, "unknown": 205, "occupied": 0}
 
 
@@ -25,12 +29,18 @@ def write_trajectory(path: Path, t: Floats, poses: Floats) -> None:
             file.write(f"{time:.6f} {x:.6f} {y:.6f} {theta:.8f}\n")
 
 
-def write_map(folder: Path, grid: GridMap, path: Floats) -> None:
+def write_map(folder: Path, grid: GridMap, path: Floats, light: GridLight | None = None) -> None:
     """``map.pgm`` + ``map.yaml`` (trinary), ``map_raw.pgm`` + ``map_raw.yaml``, ``map.npy``, ``map.npz`` and
     ``map.png``.
 
-    ``path`` (K, 3) of the robot is drawn into the picture.
+    ``path`` (K, 3) of the robot is drawn into the picture. With ``light`` also ``imap.npy`` and ``imap.png``, and its
+    layers in ``map.npz``.
     """
+    layers: dict[str, Any] = {}
+    if light is not None:
+        layers = {"light_mean": light.mean, "light_variance": light.variance, "light_count": light.count}
+        np.save(folder / "imap.npy", light.reflectance().astype(np.float32))
+        Image.fromarray(light_picture(grid, light)[::-1]).save(folder / "imap.png")
     probabilities = grid.probabilities()
     unknown = np.isnan(probabilities)
     np.save(folder / "map.npy", probabilities.astype(np.float32))
@@ -41,6 +51,7 @@ def write_map(folder: Path, grid: GridMap, path: Floats) -> None:
         origin=np.array(grid.origin),
         resolution=grid.resolution,
         path=path,
+        **layers,
     )
     trinary = _trinary(probabilities)
     Image.fromarray(trinary[::-1]).save(folder / "map.pgm")
@@ -58,6 +69,22 @@ def map_picture(occupancy: Floats, origin: tuple[float, float], resolution: floa
     if np.isfinite(path).any():
         _draw(picture, (path[:, :2] - np.array(origin)) / resolution)
     return picture[::-1]
+
+
+def light_picture(grid: GridMap, light: GridLight) -> Bytes:
+    """(H, W, 3), row 0 lowest: surfaces from dark blue (dark) to yellow (bright) on grey."""
+    probabilities = grid.probabilities()
+    picture = np.full((*grid.cells.shape, 3), _GREY["unknown"], dtype=np.uint8)
+    with np.errstate(invalid="ignore"):
+        picture[probabilities < 0.5] = _GREY["free"]
+        surface = (probabilities > OCCUPIED) & np.isfinite(light.mean)
+    if surface.any():
+        darkest, brightest = np.quantile(light.mean[surface], [0.02, 0.98])
+        share = np.clip((light.mean[surface] - darkest) / max(0.2, brightest - darkest), 0.0, 1.0)
+        stops = np.linspace(0.0, 1.0, len(_SHADES))
+        shades = np.array(_SHADES, dtype=np.float64)
+        picture[surface] = np.stack([np.interp(share, stops, shades[:, c]) for c in range(3)], axis=-1)
+    return picture
 
 
 def paths_picture(paths: list[Floats], pixels: int = 900) -> Bytes:

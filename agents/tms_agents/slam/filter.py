@@ -6,6 +6,9 @@ import numpy as np
 
 from tms_agents.slam.ancestry import Ancestry
 from tms_agents.slam.geometry import Floats, between, compose
+from tms_agents.slam.kld import enough
+from tms_agents.slam.light.filtering import ParticleLight
+from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.maps import Maps
 from tms_agents.slam.matching import SHARE, TOTAL, match_all
 from tms_agents.slam.motion import turned
@@ -17,14 +20,16 @@ class ParticleFilter:
     """Feed it scans with odometry, in order; ask for the path and the map of the best particle.
 
     Deterministic by ``settings.seed``: all random numbers are drawn before the particles are worked on side by side.
+    With ``light`` (then every scan has to come with it) matches are of geometry and light.
     """
 
-    def __init__(self, settings: Settings, laser: Floats) -> None:
+    def __init__(self, settings: Settings, laser: Floats, *, light: bool = False) -> None:
         self.settings = settings
         n = settings.particles
         self.poses: Floats = np.zeros((n, 3))
         self.log_weights: Floats = np.zeros(n)
         self.maps = Maps(n, settings.resolution, settings.reach_m)
+        self.light = ParticleLight(settings) if light else None
         self.ancestry = Ancestry(n)
         self.effective = float(n)
         self.resamplings = 0
@@ -43,17 +48,21 @@ class ParticleFilter:
         """(processed scans, 3) of the best particle."""
         return self.ancestry.path(self.best)
 
-    def process(self, odometry: Floats, driven: Floats, points: Floats) -> None:
+    def process(self, odometry: Floats, driven: Floats, points: Floats, light: LightScan | None = None) -> None:
         """One scan: ``odometry`` (3,), ``driven`` (2,) as in `Log`, ``points`` (M, 2) m seen from the robot."""
         if self._odometry is not None:
             motion = between(self._odometry, odometry)
-            self._predict_and_match(motion, self.settings.noise.covariance(motion, driven - self._driven), points)
+            self._predict_and_match(
+                motion, self.settings.noise.covariance(motion, driven - self._driven), points, light
+            )
             self._resample()
         self._odometry, self._driven = odometry, driven
         self.ancestry.append(self.poses)
         self.maps.integrate(self.poses, points, self._laser)
+        if self.light is not None and light is not None:
+            self.light.integrate(self.poses, light)
 
-    def _predict_and_match(self, motion: Floats, noise: Floats, points: Floats) -> None:
+    def _predict_and_match(self, motion: Floats, noise: Floats, points: Floats, light: LightScan | None) -> None:
         s, n = self.settings, len(self.poses)
         normals = self._random.standard_normal((2, n, 3))
         covariance = turned(noise, self.poses[:, 2])
@@ -68,6 +77,8 @@ class ParticleFilter:
             s.sigma_m, s.temperature, s.poor_share, self.maps.occupancy.directory, self.maps.occupancy.cells,
             poses, hessians, results,
         )  # fmt: skip
+        if self.light is not None and light is not None:
+            self.light.refine(self.maps, chosen, light, priors, precision, poses, hessians, results)
         # Drawn from the Gaussian around the match; the weight is the evidence of that Gaussian (Laplace).
         self.poses = poses + s.spread * drawn(hessians, normals[1])
         self.log_weights += s.temperature / s.weight_temperature * (-results[:, TOTAL]) + 0.5 * (
@@ -79,12 +90,18 @@ class ParticleFilter:
         weights = normalised(self.log_weights)
         self.effective = effective_number(weights)
         uniform = float(self._random.random())
-        if self.effective >= self.settings.resample_below * len(weights):
+        s, count = self.settings, len(weights)
+        if s.least_particles:
+            count = enough(self.poses, min(s.least_particles, s.particles), s.particles)
+        # Fewer than half are enough, or twice as many are wanted: then the number changes, too.
+        if self.effective >= s.resample_below * len(weights) and len(weights) < 2 * count < 4 * len(weights):
             return
-        parents = low_variance(weights, len(weights), uniform)
+        parents = low_variance(weights, count, uniform)
         self.poses = self.poses[parents]
         self.log_weights = np.zeros(len(parents))
         self.maps.resample(parents)
+        if self.light is not None:
+            self.light.resample(parents)
         self.ancestry.resample(parents)
         self.resamplings += 1
 

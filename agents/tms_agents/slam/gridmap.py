@@ -26,11 +26,13 @@ class GridMap:
         return probability(self.cells)
 
 
-def render(poses: Floats, scans: Iterable[Floats], laser: Floats, resolution: float, reach: float) -> Maps:
-    """One map of all ``scans`` ((M, 2) points seen from the robot) at ``poses`` (K, 3)."""
+def render(
+    poses: Floats, scans: Iterable[Floats], laser: Floats, resolution: float, reach: float, fields: bool = True
+) -> Maps:
+    """One map of all ``scans`` ((M, 2) points seen from the robot) at ``poses`` (K, 3), with distances or without."""
     maps = Maps(1, resolution, reach)
     for pose, points in zip(poses, scans, strict=True):
-        maps.integrate(pose[None], points, laser)
+        maps.integrate(pose[None], points, laser, fields)
     return maps
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +12,20 @@ from tms_agents.slam.geometry import Floats, between, compose, wrapped
 from tms_agents.slam.logs import Log
 
 Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeyScans:
+    """The K key scans of a drive: ``odometry`` (K, 3), ``driven`` (K, 2) as in `Log`, ``scans`` of (M, 2) points m seen
+    from the robot, on which the ``laser`` is at (2,) m."""
+
+    odometry: Floats
+    driven: Floats
+    scans: Sequence[Floats]
+    laser: Floats
+
+    def __len__(self) -> int:
+        return len(self.scans)
 
 
 def key_scans(log: Log, step_m: float, step_rad: float) -> Indices:

@@ -14,6 +14,9 @@ import numpy as np
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.logs import Log, LogError, driven_at, odometry_at, parse_laser
 
+#: t s; beams, first angle, step, longest range; ranges (B,), light (B,) or none.
+Scan = tuple[float, tuple[int, float, float, float], Floats, Floats | None]
+
 
 def parse_recording(lines: Iterable[str], models: str | None = None) -> Log:
     """Scans with the odometry between the records around them; ``models`` (JSON) tells the pose of the laser.
@@ -23,7 +26,7 @@ def parse_recording(lines: Iterable[str], models: str | None = None) -> Log:
     Raises:
         LogError: no scan, no odometry, or ``models`` cannot be read.
     """
-    scans: list[tuple[float, tuple[int, float, float, float], Floats, Floats | None]] = []
+    scans: list[Scan] = []
     odometry: list[tuple[float, float, float, float]] = []
     bad = 0
     for line in lines:
@@ -37,6 +40,15 @@ def parse_recording(lines: Iterable[str], models: str | None = None) -> Log:
                 scans.append(_scan(record))
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             bad += 1
+    return put_together(scans, odometry, np.zeros(3) if models is None else parse_laser(models), bad)
+
+
+def put_together(scans: list[Scan], odometry: list[tuple[float, float, float, float]], laser: Floats, bad: int) -> Log:
+    """A log of ``scans`` and records t, x, y, theta of ``odometry``, each on a clock of its own; ``bad`` were left out.
+
+    Raises:
+        LogError: no scan, or no odometry.
+    """
     if not scans or not odometry:
         raise LogError(
             f"it holds {len(scans)} scans and {len(odometry)} records of odometry" + f", {bad} bad lines" * (bad > 0)
@@ -53,13 +65,13 @@ def parse_recording(lines: Iterable[str], models: str | None = None) -> Log:
         np.array([one[2] for one in alike]),
         shape[1] + shape[2] * np.arange(float(shape[0])),
         shape[3],
-        np.zeros(3) if models is None else parse_laser(models),
+        laser,
         None if any(light is None for light in lights) else np.array(lights, dtype=np.float64),
         bad + len(scans) - len(alike),
     )
 
 
-def _scan(record: dict[str, Any]) -> tuple[float, tuple[int, float, float, float], Floats, Floats | None]:
+def _scan(record: dict[str, Any]) -> Scan:
     ranges = np.asarray(record["ranges"], dtype=np.float64)
     t, first, step, longest = _finite(record["t"], record["angle_min"], record["angle_increment"], record["range_max"])
     light = None if record.get("intensities") is None else np.asarray(record["intensities"], dtype=np.float64)

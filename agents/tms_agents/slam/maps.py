@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tms_agents.slam.distance import LARGEST_RADIUS, disc, mark_discs, update_distances
@@ -28,24 +30,36 @@ class Maps:
         self.metres: Floats = np.minimum(np.sqrt(np.arange(256.0)), self.radius) * resolution
         self._offsets = disc(self.radius)
 
-    def integrate(self, poses: Floats, points: Floats, laser: Floats) -> None:
+    def integrate(self, poses: Floats, points: Floats, laser: Floats, fields: bool = True) -> None:
         """Write one scan into every map: ``points`` (M, 2) where beams from ``laser`` (2,) ended, seen from ``poses``
-        (N, 3)."""
-        reach = float(np.hypot(points[:, 0], points[:, 1]).max(initial=0.0)) + float(np.hypot(*laser))
+        (N, 3). Without ``fields``, distances are no longer kept up."""
+        self._integrate(poses, points[None], np.array([len(points)], dtype=np.int32), laser, fields)
+
+    def integrate_each(self, poses: Floats, scans: Sequence[Floats], laser: Floats) -> None:
+        """Write a scan of its own, (M, 2) points, into each of the N maps."""
+        points, lengths = padded(scans)
+        self._integrate(poses, points, lengths, laser, True)
+
+    def _integrate(self, poses: Floats, points: Floats, lengths: Ints, laser: Floats, fields: bool) -> None:
+        reach = float(np.hypot(points[..., 0], points[..., 1]).max(initial=0.0)) + float(np.hypot(*laser))
         self._include(poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
         n, height, width = self.occupancy.directory.shape
         across = 2 * int(reach / (SIDE * self.resolution)) + 5
         seen: Bytes = np.zeros((n, height * width), dtype=np.uint8)
         wanted: Ints = np.empty((n, min(height * width, across * across)), dtype=np.int32)
         counts: Ints = np.empty(n, dtype=np.int32)
-        mark_rays(width, poses, points, laser, self.frame, seen, wanted, counts)
+        mark_rays(width, poses, points, lengths, laser, self.frame, seen, wanted, counts)
         self.occupancy.make_writable(wanted, counts)
-        changed: Ints = np.empty((n, _CHANGES_PER_BEAM * max(1, len(points))), dtype=np.int32)
+        changed: Ints = np.empty((n, _CHANGES_PER_BEAM * max(1, points.shape[1])), dtype=np.int32)
         changes: Ints = np.empty(n, dtype=np.int32)
-        lengths = np.hypot(points[:, 0] - laser[0], points[:, 1] - laser[1])
-        capacity = int((lengths * self.frame[2] + 4).sum())
+        beams = np.hypot(points[..., 0] - laser[0], points[..., 1] - laser[1])
+        capacity = int((beams * self.frame[2] + 4).sum(axis=1).max(initial=0.0))
         occupancy, distance = self.occupancy, self.distance
-        write_rays(occupancy.directory, occupancy.cells, poses, points, laser, self.frame, capacity, changed, changes)
+        write_rays(
+            occupancy.directory, occupancy.cells, poses, points, lengths, laser, self.frame, capacity, changed, changes
+        )
+        if not fields:
+            return
         mark_discs(height, width, self.radius, changed, changes, seen, wanted, counts)
         distance.make_writable(wanted, counts)
         update_distances(
@@ -65,15 +79,30 @@ class Maps:
 
     def _include(self, lowest: Floats, highest: Floats) -> None:
         """The rectangle grows, with a margin, until both corners (m) and the reach of their fields are inside."""
-        span = SIDE * self.resolution
         edge = (self.radius + 1) * self.resolution
-        height, width = self.occupancy.directory.shape[1:]
-        below = np.ceil((self.frame[:2] - (lowest - edge)) / span).astype(int)
-        above = np.ceil((highest + edge - self.frame[:2]) / span).astype(int) - np.array([width, height])
-        if (below <= 0).all() and (above <= 0).all():
-            return
-        left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
-        right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
-        self.occupancy.extend(bottom, left, top, right)
-        self.distance.extend(bottom, left, top, right)
-        self.frame = self.frame - np.array([left * span, bottom * span, 0.0])
+        self.frame = grown([self.occupancy, self.distance], self.frame, self.resolution, lowest - edge, highest + edge)
+
+
+def grown(tiles: Sequence[TiledMaps], frame: Floats, resolution: float, lowest: Floats, highest: Floats) -> Floats:
+    """``frame`` after all ``tiles``, which share it, have grown with a margin until both corners (m) are inside."""
+    span = SIDE * resolution
+    height, width = tiles[0].directory.shape[1:]
+    below = np.ceil((frame[:2] - lowest) / span).astype(int)
+    above = np.ceil((highest - frame[:2]) / span).astype(int) - np.array([width, height])
+    if (below <= 0).all() and (above <= 0).all():
+        return frame
+    left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
+    right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
+    for each in tiles:
+        each.extend(bottom, left, top, right)
+    moved: Floats = frame - np.array([left * span, bottom * span, 0.0])
+    return moved
+
+
+def padded(scans: Sequence[Floats]) -> tuple[Floats, Ints]:
+    """(points (P, M, 2), their numbers (P,)) of P scans of different lengths; what is past the end is 0."""
+    lengths: Ints = np.array([len(points) for points in scans], dtype=np.int32)
+    found = np.zeros((len(scans), int(lengths.max(initial=0)), 2))
+    for one, points in zip(found, scans, strict=True):
+        one[: len(points)] = points
+    return found, lengths

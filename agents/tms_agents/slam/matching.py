@@ -150,6 +150,30 @@ def match(
     linearise(*field, points, pose, prior, precision, sigma, temperature, hessian, gradient, result)
 
 
+@njit(cache=True, parallel=True)
+def curvatures(
+    directory: Ints,
+    squared: Bytes,
+    metres: Floats,
+    frame: Floats,
+    which: Ints,
+    points: Floats,
+    lengths: Ints,
+    poses: Floats,
+    precision: Floats,
+    sigma: float,
+    hessians: Floats,
+) -> None:
+    """``hessians`` (A, 3, 3) of the cost of scans (A, M, 2), of which the first ``lengths`` (A,) points count, at
+    ``poses`` (A, 3) in maps ``which`` (A,), with priors of ``precision`` (A, 3, 3) just there."""
+    for a in prange(len(which)):
+        gradient, result = np.empty(3), np.empty(3)
+        linearise(
+            directory[which[a]], squared, metres, frame, points[a, : lengths[a]], poses[a], poses[a], precision[a],
+            sigma, 1.0, hessians[a], gradient, result,
+        )  # fmt: skip
+
+
 @njit(cache=True)
 def linearise(
     directory: Ints,

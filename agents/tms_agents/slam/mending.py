@@ -13,6 +13,9 @@ import numpy as np
 from tms_agents.slam.agreement import agreement
 from tms_agents.slam.geometry import Floats, between, compose, wrapped
 from tms_agents.slam.gridmap import render
+from tms_agents.slam.keyframes import KeyScans
+from tms_agents.slam.light.mending import step_by_light
+from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.matching import match
 from tms_agents.slam.settings import Settings
 
@@ -22,14 +25,12 @@ _DEVIATIONS = 5.0
 _BEFORE, _CLEARLY = 8, 0.05
 
 
-def mended(
-    path: Floats, odometry: Floats, driven: Floats, scans: Sequence[Floats], laser: Floats, settings: Settings
-) -> Floats:
+def mended(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Floats:
     """``path`` (K, 3) with its jumps taken back where the scans before contradict them; what follows moves along."""
-    steps, motions = between(path[:-1], path[1:]), between(odometry[:-1], odometry[1:])
+    steps, motions = between(path[:-1], path[1:]), between(keys.odometry[:-1], keys.odometry[1:])
     off = steps - motions
     off[:, 2] = wrapped(off[:, 2])
-    noise = settings.noise.covariance(motions, np.diff(driven, axis=0))
+    noise = settings.noise.covariance(motions, np.diff(keys.driven, axis=0))
     deviations = np.sqrt(np.einsum("ki,kij,kj->k", off, np.linalg.inv(noise), off))
     if not (deviations > _DEVIATIONS).any():
         return path
@@ -38,8 +39,8 @@ def mended(
         if deviations[k] > _DEVIATIONS:
             first = max(0, k - _BEFORE + 1)
             step = _better_step(
-                between(found[k][None], found[first : k + 1]), scans[first : k + 1], scans[k + 1], laser, settings,
-                step, motions[k], np.linalg.inv(noise[k]),
+                between(found[k][None], found[first : k + 1]), keys.scans[first : k + 1], keys.scans[k + 1], keys.laser,
+                settings, step, motions[k], np.linalg.inv(noise[k]), None if lights is None else lights[first : k + 2],
             )  # fmt: skip
         found = np.concatenate([found, compose(found[-1], step)[None]])
     return found
@@ -54,9 +55,14 @@ def _better_step(
     step: Floats,
     motion: Floats,
     precision: Floats,
+    lights: Sequence[LightScan] | None,
 ) -> Floats:
     """``step`` (3,), or the match near odometry's ``motion`` if the scans ``before`` bear that out clearly better."""
     maps = render(poses, before, laser, settings.resolution, settings.reach_m)
+    if lights is not None:
+        decided = step_by_light(maps, poses, lights[:-1], points, lights[-1], step, motion, precision, settings)
+        if decided is not None:
+            return decided
     pose, hessian, result = np.empty(3), np.empty((3, 3)), np.empty(3)
     match(
         maps.distance.directory[0], maps.distance.cells, maps.metres, maps.frame, points, motion, motion, precision,

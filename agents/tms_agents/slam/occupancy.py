@@ -26,16 +26,25 @@ def probability(cells: Bytes) -> Floats:
 
 @njit(cache=True, parallel=True)
 def mark_rays(
-    width: int, poses: Floats, points: Floats, laser: Floats, frame: Floats, seen: Bytes, wanted: Ints, counts: Ints
+    width: int,
+    poses: Floats,
+    points: Floats,
+    lengths: Ints,
+    laser: Floats,
+    frame: Floats,
+    seen: Bytes,
+    wanted: Ints,
+    counts: Ints,
 ) -> None:
-    """Numbers of the tiles that rays from ``laser`` (2,) to ``points`` (M, 2) pass, into ``wanted`` (N, K) and
-    ``counts``.
+    """Numbers of the tiles that rays from ``laser`` (2,) to points pass, into ``wanted`` (N, K) and ``counts``.
 
-    Points are seen from ``poses`` (N, 3); ``frame`` is (x, y of the lower left corner in m, cells per m). ``seen``
+    ``points`` (P, M, 2), of which the first ``lengths`` (P,) count, are of one scan for all maps or of one for each (P
+    = 1 or N), seen from ``poses`` (N, 3); ``frame`` is (x, y of the lower left corner in m, cells per m). ``seen``
     (N, H * W) is scratch of zeros and is zeros again afterwards; ``width`` is W in tiles.
     """
     for n in prange(len(poses)):
-        counts[n] = _mark(width, poses[n], points, laser, frame, seen[n], wanted[n])
+        p = int(min(np.int64(n), np.int64(len(points) - 1)))
+        counts[n] = _mark(width, poses[n], points[p, : lengths[p]], laser, frame, seen[n], wanted[n])
 
 
 @njit(cache=True, parallel=True)
@@ -44,19 +53,23 @@ def write_rays(
     cells: Bytes,
     poses: Floats,
     points: Floats,
+    lengths: Ints,
     laser: Floats,
     frame: Floats,
     capacity: int,
     changed: Ints,
     counts: Ints,
 ) -> None:
-    """Hits and misses of one scan into the maps (N, H, W), whose tiles along the rays are theirs alone.
+    """Hits and misses of one scan, as in `mark_rays`, into the maps (N, H, W), whose tiles along the rays are theirs
+    alone.
 
     ``changed`` (N, L) gets the cells (y * width in cells + x) that became occupied, and as -1 - cell those that ceased
     to be. No scan touches more than ``capacity`` cells.
     """
     for n in prange(len(poses)):
-        counts[n] = _write(directory[n], cells, poses[n], points, laser, frame, capacity, changed[n])
+        p = int(min(np.int64(n), np.int64(len(points) - 1)))
+        mine = points[p, : lengths[p]]
+        counts[n] = _write(directory[n], cells, poses[n], mine, laser, frame, capacity, changed[n])
 
 
 @njit(cache=True)

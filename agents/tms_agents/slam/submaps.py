@@ -3,95 +3,86 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from tms_agents.slam.branch_and_bound import pyramid
-from tms_agents.slam.geometry import Bytes, Floats, between, transform
-from tms_agents.slam.gridmap import render
+from tms_agents.slam.branch_and_bound import LEVELS, fill_pyramids
+from tms_agents.slam.geometry import Bytes, Floats, Ints, between, transform
+from tms_agents.slam.keyframes import Indices, KeyScans
+from tms_agents.slam.light.scans import LightScan
+from tms_agents.slam.light.submaps import LightSubmaps
 from tms_agents.slam.maps import Maps
 from tms_agents.slam.settings import Settings
+from tms_agents.slam.tiles import SIDE
 
-Kept = TypeVar("Kept")
-
-#: So many submaps are kept rendered; pyramids are larger.
-_KEPT, _KEPT_PYRAMIDS = 64, 12
-#: Cells of the finest level of a search are twice as large as those of the map.
+#: So many submaps that follow each other are rendered side by side, and so many such groups remembered.
+GROUP, _KEPT = 8, 4
+#: Cells of the finest level of a search are so many times as large as those of the map.
 _POOL = 2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Submap:
-    """In the frame of the key scan ``anchor``: ``maps`` holds one map; ``sigma`` m is the error of a beam."""
-
-    anchor: int
-    maps: Maps
-    sigma: float
-
-    def levels(self) -> Bytes:
-        """The pyramid to search in, from ``origin`` on in cells of 1 / ``scale`` m."""
-        near = self.maps.metres[self.maps.distance.dense(0)]
-        scores = np.round(255 * np.exp(-0.5 * (near / self.sigma) ** 2)).astype(np.uint8)
-        height, width = scores.shape
-        return pyramid(scores.reshape(height // _POOL, _POOL, width // _POOL, _POOL).max(axis=(1, 3)))
-
-    @property
-    def origin(self) -> Floats:
-        """(2,) m."""
-        return self.maps.frame[:2]
-
-    @property
-    def scale(self) -> float:
-        """Cells of the search per m."""
-        return float(self.maps.frame[2]) / _POOL
+#: Tiles on the edge of a rectangle in which nothing is known are not searched.
+_BLANK = 0
 
 
 class Submaps:
-    """Keys ``first[s]`` up to ``first[s + 1]`` (not included) make submap s; its anchor is the key in the middle."""
+    """Keys ``first[s]`` up to ``first[s + 1]`` (not included) make submap s; its anchor is the key in the middle.
+
+    Group g are submaps ``GROUP * g`` and the following, each in the frame of its anchor.
+    """
 
     def __init__(
-        self, path: Floats, driven: Floats, scans: Sequence[Floats], laser: Floats, settings: Settings
+        self, path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None
     ) -> None:
-        self.path, self._scans, self._laser, self._settings = path, scans, laser, settings
-        way = driven[:, 0] + settings.submap_m / settings.submap_rad * driven[:, 1]
+        self.path, self.keys, self._settings = path, keys, settings
+        way = keys.driven[:, 0] + settings.submap_m / settings.submap_rad * keys.driven[:, 1]
         number = ((way - way[0]) / settings.submap_m).astype(int)
         self.first = np.concatenate([np.flatnonzero(np.diff(number, prepend=-1)), [len(path)]])
         self.anchors = (self.first[:-1] + self.first[1:] - 1) // 2
-        self._rendered: OrderedDict[int, Submap] = OrderedDict()
-        self._pyramids: OrderedDict[int, Bytes] = OrderedDict()
+        self.light = None if lights is None else LightSubmaps(lights, path, self.first, self.anchors, settings)
+        self._rendered: OrderedDict[int, Maps] = OrderedDict()
+        self._clouds: dict[int, Floats] = {}
 
     def __len__(self) -> int:
         return len(self.anchors)
 
-    def of(self, key: int) -> int:
-        """The submap that a key scan is part of."""
-        return int(np.searchsorted(self.first, key, side="right")) - 1
+    def of(self, keys: Indices) -> Indices:
+        """The submaps that key scans (K,) are part of."""
+        return np.searchsorted(self.first, keys, side="right") - 1
 
-    def rendered(self, number: int) -> Submap:
-        """Submap ``number``, from memory if it was asked for recently."""
-        return _kept(self._rendered, number, self._render, _KEPT)
+    def rendered(self, group: int) -> Maps:
+        """The maps of a group, from memory if it was asked for recently."""
+        if group not in self._rendered:
+            if len(self._rendered) == _KEPT:
+                self._rendered.popitem(last=False)
+            self._rendered[group] = self._render(range(GROUP * group, min(len(self), GROUP * (group + 1))))
+        self._rendered.move_to_end(group)
+        return self._rendered[group]
 
-    def levels(self, number: int) -> Bytes:
-        """The pyramid of submap ``number``, from memory if it was asked for recently."""
-        return _kept(self._pyramids, number, lambda one: self.rendered(one).levels(), _KEPT_PYRAMIDS)
-
-    def _render(self, number: int) -> Submap:
-        keys = np.arange(self.first[number], self.first[number + 1])
-        anchor = int(self.anchors[number])
-        relative = between(self.path[anchor][None], self.path[keys])
-        s = self._settings
-        maps = render(relative, [self._scans[k] for k in keys], self._laser, s.resolution, s.reach_m)
-        return Submap(anchor, maps, s.sigma_m)
+    def _render(self, numbers: range) -> Maps:
+        """Side by side, scan by scan; a submap of fewer scans than others gets none in the end."""
+        s, scans = self._settings, self.keys.scans
+        maps = Maps(len(numbers), s.resolution, s.reach_m)
+        laser = np.ascontiguousarray(self.keys.laser)
+        firsts, ends = self.first[numbers.start : numbers.stop], self.first[numbers.start + 1 : numbers.stop + 1]
+        anchors = self.path[self.anchors[numbers.start : numbers.stop]]
+        for step in range(int((ends - firsts).max())):
+            keys = np.minimum(firsts + step, ends - 1)
+            seen = [scans[int(key)] if firsts[n] + step < ends[n] else _NOTHING for n, key in enumerate(keys)]
+            maps.integrate_each(between(anchors, self.path[keys]), seen, laser)
+        return maps
 
     def cloud(self, key: int, around: int, most: int) -> Floats:
         """At most ``most`` points (M, 2) of the scans up to ``around`` keys from ``key``, in its frame, evenly
         spread."""
+        if key not in self._clouds:
+            self._clouds[key] = self._cloud(key, around, most)
+        return self._clouds[key]
+
+    def _cloud(self, key: int, around: int, most: int) -> Floats:
         keys = np.arange(max(0, key - around), min(len(self.path), key + around + 1))
         relative = between(self.path[key][None], self.path[keys])
-        points = np.concatenate([transform(pose, self._scans[int(k)]) for pose, k in zip(relative, keys, strict=True)])
+        scans = self.keys.scans
+        points = np.concatenate([transform(pose, scans[int(k)]) for pose, k in zip(relative, keys, strict=True)])
         cell = 0.1
         while True:
             _, chosen = np.unique((points / cell).round().astype(np.int64) @ np.array([1, 1 << 20]), return_index=True)
@@ -100,11 +91,21 @@ class Submaps:
             cell *= 1.25
 
 
-def _kept(memory: OrderedDict[int, Kept], number: int, make: Callable[[int], Kept], most: int) -> Kept:
-    """What ``memory`` holds of ``number``, made if it is not there; at most so many are remembered."""
-    if number not in memory:
-        memory[number] = make(number)
-        if len(memory) > most:
-            memory.popitem(last=False)
-    memory.move_to_end(number)
-    return memory[number]
+_NOTHING: Floats = np.zeros((0, 2))
+
+
+def pyramids(maps: Maps, which: Ints, sigma: float) -> tuple[Bytes, Floats, float]:
+    """(levels (N, LEVELS, H, W), lower left corner (2,) m, cells per m) to search maps ``which`` (N,) in; ``sigma`` m
+    is the error of a beam."""
+    directory = maps.distance.directory[which]
+    rows, columns = (np.flatnonzero((directory != _BLANK).any(axis=axes)) for axes in ((0, 2), (0, 1)))
+    bottom, left = (int(found[0]) if len(found) else 0 for found in (rows, columns))
+    top, right = (int(found[-1]) + 1 if len(found) else 1 for found in (rows, columns))
+    directory = np.ascontiguousarray(directory[:, bottom:top, left:right])
+    scores = np.round(255 * np.exp(-0.5 * (maps.metres / sigma) ** 2)).astype(np.uint8)
+    pad = 1 << (LEVELS - 1)
+    height, width = (SIDE * count // _POOL + pad for count in directory.shape[1:])
+    levels: Bytes = np.zeros((len(which), LEVELS, height, width), dtype=np.uint8)
+    fill_pyramids(directory, maps.distance.cells, scores, _POOL, levels)
+    corner = maps.frame[:2] + SIDE * maps.resolution * np.array([left, bottom])
+    return levels, corner, float(maps.frame[2]) / _POOL

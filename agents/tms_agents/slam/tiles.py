@@ -1,16 +1,22 @@
 """Many maps that share their tiles until one of them writes: copy-on-write in plain arrays, for the kernels.
 
-A tile is 32 x 32 bytes. Every map has a directory of tile numbers over the same rectangle; tile 0 is the blank tile,
-which all maps share and nobody writes. Kernels write only to tiles that ``make_writable`` has given to their map
-alone, so maps can be written side by side, and what they hold does not depend on the number of threads.
+A tile is 32 x 32 cells (bytes, where nothing else is said). Every map has a directory of tile numbers over the same
+rectangle; tile 0 is the blank tile, which all maps share and nobody writes. Kernels write only to tiles that
+``make_writable`` has given to their map alone, so maps can be written side by side, and what they hold does not depend
+on the number of threads.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Bytes, Ints
+
+Cells = NDArray[Any]
 
 SHIFT = 5
 SIDE = 1 << SHIFT
@@ -19,11 +25,16 @@ _CELLS = SIDE * SIDE
 
 
 class TiledMaps:
-    """``directory`` (N, H, W) tile numbers of N maps, ``cells`` (C, 1024) of C tiles, ``references`` (C,) to each."""
+    """``directory`` (N, H, W) tile numbers of N maps, ``cells`` (C, 1024) of C tiles, ``references`` (C,) to each.
 
-    def __init__(self, maps: int, blank: int, height: int, width: int) -> None:
+    Maps of several ``layers`` hold one after the other in a row of ``cells``, (C, layers * 1024) of ``dtype``.
+    """
+
+    def __init__(
+        self, maps: int, blank: float, height: int, width: int, *, layers: int = 1, dtype: type[np.generic] = np.uint8
+    ) -> None:
         self.directory: Ints = np.zeros((maps, height, width), dtype=np.int32)
-        self.cells: Bytes = np.full((64, _CELLS), blank, dtype=np.uint8)
+        self.cells: Cells = np.full((64, layers * _CELLS), blank, dtype=dtype)
         self.references: Ints = np.zeros(64, dtype=np.int32)
         self.blank = blank
         self._free: Ints = np.arange(63, 0, -1, dtype=np.int32)  # a stack, its top at [_unused - 1]
@@ -67,7 +78,7 @@ class TiledMaps:
     def _grow(self, missing: int) -> None:
         old = len(self.cells)
         size = old + max(missing, old // 4)
-        cells = np.empty((size, _CELLS), dtype=np.uint8)
+        cells = np.empty((size, self.cells.shape[1]), dtype=self.cells.dtype)
         cells[:old] = self.cells
         cells[old:] = self.blank
         self.cells = cells
@@ -82,7 +93,7 @@ class TiledMaps:
 
 @njit(cache=True)
 def _make_writable(
-    directory: Ints, cells: Bytes, references: Ints, free: Ints, unused: int, wanted: Ints, counts: Ints, blank: int
+    directory: Ints, cells: Cells, references: Ints, free: Ints, unused: int, wanted: Ints, counts: Ints, blank: float
 ) -> int:
     for n in range(len(counts)):
         for k in range(counts[n]):

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.slam.branch_and_bound import best_pose, pyramid
+from tms_agents.slam.branch_and_bound import LEVELS, best_pose, fill_pyramids
 from tms_agents.slam.filter import drawn
 from tms_agents.slam.gridmap import render
 from tms_agents.slam.matching import SHARE, linearise, match_all
+from tms_agents.slam.tiles import SIDE, TiledMaps
 
 ORIGIN = np.zeros(2)
 
@@ -94,6 +95,20 @@ def test_nothing_good_enough_is_nothing():
     found = np.empty(3)
     empty = pyramid(np.zeros((40, 40), dtype=np.uint8))
     assert best_pose(empty, ORIGIN, 10.0, np.ones((5, 2)), np.zeros(3), 1.0, 0.1, 0.05, 0.3, found) == 0.0
+
+
+def pyramid(scores):
+    """Of scores (H, W), by way of tiles whose squared distances are the scores themselves."""
+    tiles = TiledMaps(1, 0, -(-scores.shape[0] // SIDE), -(-scores.shape[1] // SIDE))
+    height, width = tiles.directory.shape[1:]
+    wanted = np.arange(height * width, dtype=np.int32)[None]
+    tiles.make_writable(wanted, np.array([height * width], dtype=np.int32))
+    for y, x in np.ndindex(scores.shape):
+        tiles.cells[tiles.directory[0, y // SIDE, x // SIDE], y % SIDE * SIDE + x % SIDE] = scores[y, x]
+    pad = 1 << (LEVELS - 1)
+    levels = np.zeros((1, LEVELS, SIDE * height + pad, SIDE * width + pad), dtype=np.uint8)
+    fill_pyramids(tiles.directory, tiles.cells, np.arange(256, dtype=np.uint8), 1, levels)
+    return levels[0]
 
 
 def _score(scores, points, pose):
