@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from tms_agents.commands.slam_compare import compare
+from tms_agents.commands.slam_semidynamic import add_arguments
 from tms_agents.slam.export import write_map, write_trajectory
 from tms_agents.slam.logs import Log, LogError, parse_laser, read_log
 from tms_agents.slam.mapping import Progress, Result, build_map
@@ -36,6 +37,7 @@ def main(argv: Sequence[str]) -> int:
     run.add_argument("--seed", type=int, default=DEFAULTS.seed, metavar="S")
     run.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores; results are the same")
     run.set_defaults(work=_run)
+    add_arguments(kinds.add_parser("semidynamic", help="also doors and furniture, whose tags were read"))
     other = kinds.add_parser("compare", help="two results, or one with known relations")
     other.add_argument("a", type=Path, metavar="A", help="DIR of tms slam run, or a trajectory")
     other.add_argument("b", type=Path, metavar="B", help="the same, or relations (.relations, may be .gz)")

@@ -121,7 +121,7 @@ def _driven(plan: Plan) -> tuple[Floats, Floats, NDArray[np.int64]]:
             wanted = float(np.arctan2(*(b - a)[::-1]))
             turn = (wanted - steps[-1][2] + np.pi) % (2 * np.pi) - np.pi
             count = max(1, int(abs(turn) / (0.1 * _TURN)))
-            steps += [np.array([*a, steps[-1][2] + turn / count * (i + 1)]) for i in range(count) for _ in (0,)][:count]
+            steps += [np.array([*a, steps[-1][2] + turn / count * (i + 1)]) for i in range(count)]
             count = int(np.hypot(*(b - a)) / (0.1 * _SPEED))
             sway = 0.06 * np.sin(np.linspace(0, 2 * np.pi * max(1, round(count / 80)), count + 1)[1:])
             side = np.array([-np.sin(wanted), np.cos(wanted)])
@@ -152,7 +152,9 @@ def _odometry(t: Floats, truth: Floats, how: Devices, random: np.random.Generato
         turn = (b[2] - a[2] + np.pi) % (2 * np.pi) - np.pi
         way = float(np.hypot(along, across))
         if way + abs(turn) > 1e-9:
-            turn = turning * turn + pull * way + random.normal(0, 0.02 * np.sqrt(abs(turn)) * 0.3 + 0.004 * np.sqrt(way))
+            turn = (
+                turning * turn + pull * way + random.normal(0, 0.02 * np.sqrt(abs(turn)) * 0.3 + 0.004 * np.sqrt(way))
+            )
             along = scale * along + random.normal(0, 0.02 * np.sqrt(way) * 0.5)
             if random.random() < how.slips * 0.1:
                 turn += random.normal(0, how.slip_rad)
@@ -177,9 +179,7 @@ def _intervals(plan: Plan, t: Floats, truth: Floats, legs: NDArray[np.int64]) ->
             else:
                 away = np.hypot(*(truth[:, :2] - thing.poses[0][:2]).T) > 10.0
                 span = (t > t[-1] * (k / plan.passes - 0.25)) & (t < t[-1] * (k / plan.passes + 0.25)) & away
-                near = np.flatnonzero(np.diff(span.astype(int)))
                 runs = np.split(np.flatnonzero(span), np.flatnonzero(np.diff(np.flatnonzero(span)) > 1) + 1)
-                assert len(near)
                 longest = max(runs, key=len)
                 cuts.append(float(t[longest[len(longest) // 2]]))
         found.append([(a, b) for a, b in itertools.pairwise([*cuts, float(t[-1]) + 1.0])])

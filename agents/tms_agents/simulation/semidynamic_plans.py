@@ -86,7 +86,9 @@ def room(random: np.random.Generator) -> Plan:
     angles = _swings(plan.passes, np.pi / 2, 1.0, random)
     hinge = (side + _RECESS, 0.45 * side - 0.55)
     poses = [(*hinge, angle) for angle in angles]
-    plan.things.append(Thing("door_1", "door_large", (_box(0.0, -0.02, 1.08, 0.02),), (0.4, 0.02, np.pi / 2), poses, np.pi / 2))
+    plan.things.append(
+        Thing("door_1", "door_large", (_box(0.0, -0.02, 1.08, 0.02),), (0.4, 0.02, np.pi / 2), poses, np.pi / 2)
+    )
     middle = np.array([side / 2, side / 2])
     for number in range(3):
         _free(plan, f"cabinet_{number + 1}", "cabinet", middle, 0.5 * side - 0.5, random)
@@ -127,7 +129,7 @@ def shifted(random: np.random.Generator) -> Plan:
     for number in range(7):
         x, side = 2.0 + number * (length - 5) / 7, number % 2
         y = width - 0.3 if side else 0.3
-        theta = random.uniform(-0.2, 0.2) + np.pi / 2 * random.integers(4)
+        theta = float(random.uniform(-0.2, 0.2) + np.pi / 2 * random.integers(4))
         kind = ("cabinet", "bin_box")[number % 2]
         poses = [(x + way * k, y, theta) for k in range(plan.passes)]
         plan.things.append(_thing(f"{kind}_{number}", kind, poses))
@@ -150,7 +152,9 @@ def _corridor(length: float, width: float, passes: int = 3) -> Plan:
     return Plan([(0.0, 0.0, length, width)], route, passes)
 
 
-def _doors(plan: Plan, places: list[tuple[float, int]], width: float, random: np.random.Generator, kinds: object) -> None:
+def _doors(
+    plan: Plan, places: list[tuple[float, int]], width: float, random: np.random.Generator, kinds: object
+) -> None:
     assert isinstance(kinds, (list, tuple))
     for (x, side), kind in zip(places, kinds, strict=True):
         _door(plan, x, width if side else 0.0, 1 if side else -1, random, kind)
@@ -158,7 +162,9 @@ def _doors(plan: Plan, places: list[tuple[float, int]], width: float, random: np
 
 def _door(plan: Plan, x: float, wall: float, sign: int, random: np.random.Generator, kind: str) -> None:
     """In a wall along x at y = ``wall``; ``sign`` is the side of the room behind it."""
-    long, thick = {"door_large": (random.uniform(0.95, 1.15), 0.04), "door_small": (random.uniform(0.62, 0.75), 0.035)}[kind]
+    long, thick = {"door_large": (random.uniform(0.95, 1.15), 0.04), "door_small": (random.uniform(0.62, 0.75), 0.035)}[
+        kind
+    ]
     into_room = random.random() < 0.7
     # What opens into the corridor hangs at its side of the wall.
     plane, far = wall + sign * (_RECESS if into_room else 0.03), wall + sign * _RECESS
@@ -234,9 +240,7 @@ def _thing(label: str, kind: str, poses: list[Pose]) -> Thing:
         ring = 0.16 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
         return Thing(label, kind, (ring,), (0.157, 0.0, 0.0), poses)
     if kind == "chair":
-        legs = tuple(
-            _box(x - 0.02, y - 0.02, x + 0.02, y + 0.02) for x in (-0.19, 0.19) for y in (-0.19, 0.19)
-        )
+        legs = tuple(_box(x - 0.02, y - 0.02, x + 0.02, y + 0.02) for x in (-0.19, 0.19) for y in (-0.19, 0.19))
         return Thing(label, kind, legs, (0.21, 0.0, 0.0), poses)
     return Thing(label, kind, (_box(-0.22, -0.3, 0.22, 0.3),), (0.22, 0.0, 0.0), poses)
 

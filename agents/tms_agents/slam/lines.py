@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.logs import Log
@@ -52,7 +51,7 @@ def match_lines(fixed: Lines, moving: Lines, start: Floats, reach: float, sigma:
 
 
 @njit(cache=True)
-def _fit(points, normals):  # type: ignore[no-untyped-def]
+def _fit(points: Floats, normals: Floats) -> None:
     count = points.shape[0]
     for b in range(count):
         if math.isnan(points[b, 0]):
@@ -82,7 +81,18 @@ def _fit(points, normals):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _match(points, normals, laser, first, step, moving, reach, sigma, pose, hessian):  # type: ignore[no-untyped-def]
+def _match(
+    points: Floats,
+    normals: Floats,
+    laser: Floats,
+    first: float,
+    step: float,
+    moving: Floats,
+    reach: float,
+    sigma: float,
+    pose: Floats,
+    hessian: Floats,
+) -> float:
     count = points.shape[0]
     gradient = np.zeros(3)
     share = 0.0
@@ -96,7 +106,7 @@ def _match(points, normals, laser, first, step, moving, reach, sigma, pose, hess
                 continue
             rx, ry = c * moving[m, 0] - s * moving[m, 1], s * moving[m, 0] + c * moving[m, 1]
             x, y = pose[0] + rx, pose[1] + ry
-            beam = int(round((math.atan2(y - laser[1], x - laser[0]) - first) / step))
+            beam = round((math.atan2(y - laser[1], x - laser[0]) - first) / step)
             if beam < -_WINDOW or beam >= count + _WINDOW:
                 continue
             best, found = reach * reach, -1

@@ -52,7 +52,8 @@ def _odometry(log: Log, keys: Indices, noise: OdometryNoise) -> Edges:
     motions = between(log.odometry[keys[:-1]], log.odometry[keys[1:]])
     covariance = noise.covariance(motions, np.diff(log.driven[keys], axis=0))
     numbers = np.arange(len(keys))
-    return Edges(numbers[:-1], numbers[1:], motions, np.linalg.inv(covariance))
+    information: Floats = np.linalg.inv(covariance).astype(np.float64)
+    return Edges(numbers[:-1], numbers[1:], motions, information)
 
 
 def _pairs(path: Floats) -> list[tuple[int, int]]:

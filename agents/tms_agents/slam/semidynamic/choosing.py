@@ -19,7 +19,8 @@ _SAME_PASS, _SAME_PLACE = 5.0, 1.0
 _SHARED_M, _SHARED = 0.05, 0.5
 #: Poses nearer to each other (m, rad) are the same.
 SAME_M, SAME_RAD = 0.08, 0.2
-_SWEEPS = 4
+#: At most so many times all anew; scores so near are the same.
+_SWEEPS, _SAME_SCORE = 4, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +61,9 @@ def choose(tracks: Mapping[str, Track]) -> None:
     for _ in range(_SWEEPS):
         changed = False
         for tag in sorted(tracks):
-            before = tracks[tag].chosen
+            before = tracks[tag].total
             _solve(tracks[tag], tracks, at_once)
-            changed |= not np.array_equal(before, tracks[tag].chosen)
+            changed |= abs(tracks[tag].total - before) > _SAME_SCORE
         for a, b in itertools.combinations(sorted(tracks), 2):
             if any(other == b for _, other, _ in at_once[a]):
                 changed |= _again(tracks[a], tracks[b], tracks, at_once)
@@ -98,7 +99,7 @@ def _again(a: Track, b: Track, tracks: Mapping[str, Track], at_once: _Shared) ->
         _solve(second, tracks, at_once)
         _solve(first, tracks, at_once)
         total = _joint(a, b, tracks, at_once)
-        if total > best + 1e-6:
+        if total > best + _SAME_SCORE:
             best, found = total, (a.chosen, b.chosen)
     a.chosen, b.chosen = found
     return found is not kept

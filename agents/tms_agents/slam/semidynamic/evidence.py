@@ -111,7 +111,20 @@ def _always(other: Beams) -> Floats:
 
 
 @njit(cache=True)
-def count(poses, laser, ranges, angles, range_max, scans, corner, cell, blur, hits, passes, course):  # type: ignore[no-untyped-def]
+def count(
+    poses: Floats,
+    laser: Floats,
+    ranges: Floats,
+    angles: Floats,
+    range_max: float,
+    scans: NDArray[np.int64],
+    corner: Floats,
+    cell: float,
+    blur: float,
+    hits: Counts,
+    passes: Counts,
+    course: Floats,
+) -> None:
     """Follow every beam through the cells of the square."""
     height, width = hits.shape
     for k in range(scans.shape[0]):

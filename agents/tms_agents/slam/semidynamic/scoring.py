@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats, compose
 from tms_agents.slam.semidynamic.antenna import read_odds
@@ -60,7 +61,22 @@ class Sight:
 
 
 @njit(cache=True)
-def _sums(poses, outline, normals, beyond, inside, seen, always, towards, through, deep, wall, corner, cell, found):  # type: ignore[no-untyped-def]
+def _sums(
+    poses: Floats,
+    outline: Floats,
+    normals: Floats,
+    beyond: Floats,
+    inside: Floats,
+    seen: Floats,
+    always: Floats,
+    towards: Floats,
+    through: Floats,
+    deep: Floats,
+    wall: NDArray[np.bool_],
+    corner: Floats,
+    cell: float,
+    found: Floats,
+) -> None:
     height, width = seen.shape
     for n in range(poses.shape[0]):
         c, s = np.cos(poses[n, 2]), np.sin(poses[n, 2])

@@ -58,17 +58,13 @@ def _chosen(track: Track) -> Floats:
     return track.chosen
 
 
-def _free(
-    sights: Sequence[Sight], model: ObjectModel, shape: Shape, random: np.random.Generator
-) -> list[Family]:
+def _free(sights: Sequence[Sight], model: ObjectModel, shape: Shape, random: np.random.Generator) -> list[Family]:
     """What is a candidate at one visit is one at all."""
     every = np.concatenate([candidates(sight, model, shape, random)[0] for sight in sights])
     return [Family(tuple(every for _ in sights), tuple(sight.score(model, shape, every) for sight in sights))]
 
 
-def _hinged(
-    sights: Sequence[Sight], model: ObjectModel, shape: Shape, random: np.random.Generator
-) -> list[Family]:
+def _hinged(sights: Sequence[Sight], model: ObjectModel, shape: Shape, random: np.random.Generator) -> list[Family]:
     """All visits together: the hinge stays where it is, only the angle changes."""
     found = [candidates(sight, model, shape, random)[0] for sight in sights]
     hinges, totals = _rated(np.concatenate(found)[:, :2], sights, model, shape)
