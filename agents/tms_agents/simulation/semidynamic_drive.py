@@ -156,7 +156,7 @@ def _odometry(t: Floats, truth: Floats, how: Devices, random: np.random.Generato
                 turning * turn + pull * way + random.normal(0, 0.02 * np.sqrt(abs(turn)) * 0.3 + 0.004 * np.sqrt(way))
             )
             along = scale * along + random.normal(0, 0.02 * np.sqrt(way) * 0.5)
-            if random.random() < how.slips * 0.1:
+            if random.uniform() < how.slips * 0.1:
                 turn += random.normal(0, how.slip_rad)
         else:
             turn = along = across = 0.0
@@ -211,9 +211,9 @@ def _scan(
     ranges = np.round(met + random.normal(0, how.noise_m, _BEAMS), 3)
     # The last beam of a surface sees it and what is behind.
     mixed = np.flatnonzero(np.abs(np.diff(met)) > 0.3)
-    mixed = mixed[random.random(len(mixed)) < 0.15]
-    ranges[mixed] = np.round(met[mixed] + random.random(len(mixed)) * (met[mixed + 1] - met[mixed]), 3)
-    gone = (met > _REACH_M - 0.05) | (random.random(_BEAMS) < how.lost)
+    mixed = mixed[random.uniform(size=len(mixed)) < 0.15]
+    ranges[mixed] = np.round(met[mixed] + random.uniform(size=len(mixed)) * (met[mixed + 1] - met[mixed]), 3)
+    gone = (met > _REACH_M - 0.05) | (random.uniform(size=_BEAMS) < how.lost)
     ranges = np.where(gone, _NONE, ranges)
     return {
         "t": round(float(t), 3),

@@ -165,14 +165,14 @@ def _door(plan: Plan, x: float, wall: float, sign: int, random: np.random.Genera
     long, thick = {"door_large": (random.uniform(0.95, 1.15), 0.04), "door_small": (random.uniform(0.62, 0.75), 0.035)}[
         kind
     ]
-    into_room = random.random() < 0.7
+    into_room = random.uniform() < 0.7
     # What opens into the corridor hangs at its side of the wall.
     plane, far = wall + sign * (_RECESS if into_room else 0.03), wall + sign * _RECESS
     plan.rectangles.append((x, min(wall, far), x + long + 0.02, max(wall, far)))
     deep = far + sign * random.uniform(1.8, 2.6)
     plan.rectangles.append((x - 0.5, min(far, deep), x + long + 0.6, max(far, deep)))
     # Hinged at the right or left; opens into the corridor or the room.
-    left = random.random() < 0.5
+    left = random.uniform() < 0.5
     hinge, closed = ((x + 0.01, plane), 0.0) if left else ((x + long + 0.01, plane), np.pi)
     turn = (1.0 if left else -1.0) * (sign if into_room else -sign)
     poses = [(*hinge, angle) for angle in _swings(plan.passes, closed, turn, random)]
@@ -187,10 +187,10 @@ def _swings(passes: int, closed: float, turn: float, random: np.random.Generator
     """Open and closed by turns, sometimes as before."""
     found: list[float] = []
     for _ in range(passes):
-        if found and random.random() < 0.3:
+        if found and random.uniform() < 0.3:
             found.append(found[-1])
         else:
-            found.append(closed + turn * (0.0 if random.random() < 0.45 else random.uniform(0.5, 1.6)))
+            found.append(closed + turn * (0.0 if random.uniform() < 0.45 else random.uniform(0.5, 1.6)))
     return found
 
 
@@ -203,11 +203,11 @@ def _bins(
 
 def _bin(plan: Plan, x: float, y: float, random: np.random.Generator, near: float = 0.7) -> None:
     number = sum(thing.kind.startswith("bin") for thing in plan.things) + 1
-    kind = "bin_round" if random.random() < 0.35 else "bin_box"
+    kind = "bin_round" if random.uniform() < 0.35 else "bin_box"
     poses: list[Pose] = []
     inward = np.pi / 2 if y < plan.route[0, 1] or y < 0 else -np.pi / 2
     for _ in range(plan.passes):
-        if poses and random.random() < 0.3:
+        if poses and random.uniform() < 0.3:
             poses.append(poses[-1])
         else:
             theta = inward + random.uniform(-0.9, 0.9)
@@ -219,7 +219,7 @@ def _free(plan: Plan, label: str, kind: str, middle: Floats, reach: float, rando
     """Somewhere in a room, off the route and off other things."""
     poses: list[Pose] = []
     for n in range(plan.passes):
-        if poses and random.random() < 0.3:
+        if poses and random.uniform() < 0.3:
             poses.append(poses[-1])
             continue
         for _ in range(500):
