@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tms_agents.commands import slam_localise, slam_upload
+from tms_agents.commands import slam_localise, slam_semidynamic, slam_upload
 from tms_agents.commands.slam_compare import compare
 from tms_agents.commands.slam_log import add_log_options, make_folder, read, set_threads
 from tms_agents.slam.export import write_map, write_trajectory
@@ -53,6 +53,7 @@ def main(argv: Sequence[str]) -> int:
     run.set_defaults(work=_run)
     place = kinds.add_parser("localise", help="where a robot is in a map that is known, from anywhere")
     slam_localise.add_options(place)
+    slam_semidynamic.add_options(kinds.add_parser("semidynamic", help="also doors and furniture, whose tags were read"))
     other = kinds.add_parser("compare", help="two results, or one with known relations")
     other.add_argument("a", type=Path, metavar="A", help="DIR of tms slam run, or a trajectory")
     other.add_argument("b", type=Path, metavar="B", help="the same, or relations (.relations, may be .gz)")

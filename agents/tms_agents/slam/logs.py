@@ -72,9 +72,9 @@ def read_log(path: Path) -> Log:
     name = path.name.removesuffix(".gz").lower()
     if name.endswith(".jsonl"):
         models = path.with_name("models.json")
-        return parse_recording(_lines(path), models.read_text() if models.exists() else None)
+        return parse_recording(lines_of_file(path), models.read_text() if models.exists() else None)
     if name.endswith((".log", ".clf")):
-        return parse_carmen(_lines(path))
+        return parse_carmen(lines_of_file(path))
     path.open("rb").close()  # a file that is not there is said to be so
     raise LogError("not a log: its name ends in .log, .clf or .jsonl (or one of them and .gz)")
 
@@ -129,7 +129,7 @@ def driven_at(times: Floats, poses: Floats, t: Floats) -> Floats:
     return np.stack([np.interp(t, times, column) for column in sums.T], axis=-1)
 
 
-def _lines(path: Path) -> Iterator[str]:
+def lines_of_file(path: Path) -> Iterator[str]:
     """Lines of text; a file that is broken off ends where it breaks."""
     with path.open("rb") as raw:
         packed = raw.read(2) == _GZIP

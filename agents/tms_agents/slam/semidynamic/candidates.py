@@ -1,0 +1,91 @@
+"""Poses that an object may have, from where its tag was read and from what the beams met there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tms_agents.slam.geometry import Floats, compose, inverse, wrapped
+from tms_agents.slam.semidynamic.evidence import CELL_M
+from tms_agents.slam.semidynamic.models import ObjectModel
+from tms_agents.slam.semidynamic.scoring import Sight
+from tms_agents.slam.semidynamic.shapes import Shape
+
+_FROM_READS, _FROM_SURFACES = 2000, 4000
+#: So many of the best are refined, by steps (m, rad) that are halved so often.
+_REFINED, _STEPS, _HALVED = 60, (0.06, 0.12), 4
+#: Poses nearer to each other (m, rad) are one.
+_SAME_M, _SAME_RAD = 0.06, 0.15
+
+
+def candidates(
+    sight: Sight, model: ObjectModel, shape: Shape, random: np.random.Generator, most: int = 24
+) -> tuple[Floats, Floats]:
+    """Poses (C, 3) and their scores (C,), best first, at most ``most``."""
+    tried = np.concatenate([_from_reads(sight, model, random), _from_surfaces(sight, model, shape, random)])
+    rough = sight.score(model, shape, tried)
+    best = tried[np.argsort(-rough, kind="stable")[: 4 * _REFINED]]
+    poses = refined(sight, model, shape, _apart(best)[:_REFINED])
+    scores = sight.score(model, shape, poses)
+    order = np.argsort(-scores, kind="stable")
+    kept = _apart(poses[order])[:most]
+    return kept, sight.score(model, shape, kept)
+
+
+def refined(sight: Sight, model: ObjectModel, shape: Shape, poses: Floats) -> Floats:
+    """Each of ``poses`` (N, 3) moved uphill."""
+    moves = np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=float)
+    step = np.array([_STEPS[0], _STEPS[0], _STEPS[1]])
+    for _ in range(_HALVED):
+        for _ in range(3):
+            around = (poses[:, None, :] + moves * step).reshape(-1, 3)
+            scores = sight.score(model, shape, around).reshape(len(poses), -1)
+            poses = poses + moves[np.argmax(scores, axis=1)] * step
+        step = step / 2
+    poses[:, 2] = wrapped(poses[:, 2])
+    return poses
+
+
+def _from_reads(sight: Sight, model: ObjectModel, random: np.random.Generator) -> Floats:
+    """Tags within the reach of antennas that read them, turned towards these."""
+    seen_from = _readers(sight)
+    reach = max(one.antenna.reach for one in sight.heard)
+    origin = seen_from[random.integers(len(seen_from), size=_FROM_READS)]
+    bearing = random.uniform(-1.4, 1.4, _FROM_READS)
+    distance = reach * np.sqrt(random.uniform(0.01, 1, _FROM_READS)) * np.sqrt(np.maximum(np.cos(bearing), 0.05))
+    facing = bearing + np.pi + random.uniform(-1.4, 1.4, _FROM_READS)
+    seen = np.stack([distance * np.cos(bearing), distance * np.sin(bearing), facing], axis=-1)
+    return compose(compose(origin, seen), np.broadcast_to(inverse(model.tag), seen.shape))
+
+
+def _from_surfaces(sight: Sight, model: ObjectModel, shape: Shape, random: np.random.Generator) -> Floats:
+    """A point of the outline at a cell where beams ended that do not always end there, turned as the reads have it."""
+    promising = np.argwhere(sight.cells.seen + sight.cells.always > 0.15)
+    if not len(promising):
+        return np.empty((0, 3))
+    seen_from = _readers(sight)
+    cells = promising[random.integers(len(promising), size=_FROM_SURFACES)]
+    at = sight.place.corner + (cells[:, ::-1] + 0.5) * CELL_M
+    points = shape.outline[random.integers(len(shape.outline), size=_FROM_SURFACES)]
+    antenna = seen_from[random.integers(len(seen_from), size=_FROM_SURFACES)]
+    towards = np.arctan2(antenna[:, 1] - at[:, 1], antenna[:, 0] - at[:, 0])
+    turn = towards - model.tag[2] + random.uniform(-1.4, 1.4, _FROM_SURFACES)
+    c, s = np.cos(turn), np.sin(turn)
+    x = at[:, 0] - c * points[:, 0] + s * points[:, 1]
+    y = at[:, 1] - s * points[:, 0] - c * points[:, 1]
+    return np.stack([x, y, wrapped(turn)], axis=-1)
+
+
+def _readers(sight: Sight) -> Floats:
+    """Antenna poses (R, 3) that read the tag."""
+    return np.concatenate([one.poses for one in sight.heard if one.read])
+
+
+def _apart(poses: Floats) -> Floats:
+    """Those of ``poses`` (N, 3), the best first, that are not nearly one that comes before them."""
+    kept: list[Floats] = []
+    for pose in poses:
+        if all(
+            np.hypot(*(pose - other)[:2]) > _SAME_M or abs(wrapped(pose[2] - other[2])) > _SAME_RAD for other in kept
+        ):
+            kept.append(pose)
+    return np.array(kept).reshape(-1, 3)

@@ -1,0 +1,171 @@
+"""Which candidates together: every object has its own place, most things are where they were, hinges do not move."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tms_agents.slam.geometry import Floats, transform, wrapped
+from tms_agents.slam.semidynamic.shapes import Shape
+from tms_agents.slam.semidynamic.visits import Visit
+
+#: How much better another pose must be than the one before: within a pass of the robot, and after it was parked.
+_SAME_PASS, _SAME_PLACE = 5.0, 1.0
+#: Points of an outline so near to another object's outline (m) are one surface, and count so much less.
+_SHARED_M, _SHARED = 0.05, 0.5
+#: Poses nearer to each other (m, rad) are the same.
+SAME_M, SAME_RAD = 0.08, 0.2
+#: At most so many times all anew; scores so near are the same.
+_SWEEPS, _SAME_SCORE = 4, 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Family:
+    """Candidates that can follow each other: per visit poses (C, 3) and their scores (C,)."""
+
+    poses: tuple[Floats, ...]
+    scores: tuple[Floats, ...]
+
+
+@dataclass(slots=True, eq=False)
+class Track:
+    """All visits of one tag; ``chosen`` poses (V, 3) once there are any, ``total`` their score."""
+
+    tag: str
+    shape: Shape
+    visits: Sequence[Visit]
+    families: Sequence[Family]
+    chosen: Floats | None = None
+    total: float = 0.0
+    _trees: dict[bytes, cKDTree] = field(default_factory=dict)
+
+    def outline(self, pose: Floats) -> Floats:
+        return transform(pose, self.shape.outline)
+
+    def tree(self, pose: Floats) -> cKDTree:
+        key = pose.tobytes()
+        if key not in self._trees:
+            self._trees[key] = cKDTree(self.outline(pose))
+        return self._trees[key]
+
+
+def choose(tracks: Mapping[str, Track]) -> None:
+    """Sets ``chosen`` of every track: the best by itself first, then pairs anew in both orders while that is better."""
+    at_once = _at_once(tracks)
+    for tag in sorted(tracks, key=lambda tag: (-_best_alone(tracks[tag]), tag)):
+        _solve(tracks[tag], tracks, at_once)
+    for _ in range(_SWEEPS):
+        changed = False
+        for tag in sorted(tracks):
+            before = tracks[tag].total
+            _solve(tracks[tag], tracks, at_once)
+            changed |= abs(tracks[tag].total - before) > _SAME_SCORE
+        for a, b in itertools.combinations(sorted(tracks), 2):
+            if any(other == b for _, other, _ in at_once[a]):
+                changed |= _again(tracks[a], tracks[b], tracks, at_once)
+        if not changed:
+            break
+
+
+_Shared = Mapping[str, Sequence[tuple[int, str, int]]]
+
+
+def _at_once(tracks: Mapping[str, Track]) -> _Shared:
+    """Per tag: (its visit, another tag, that one's visit) that share scans."""
+    found: dict[str, list[tuple[int, str, int]]] = {tag: [] for tag in tracks}
+    for a, b in itertools.permutations(tracks, 2):
+        for i, visit in enumerate(tracks[a].visits):
+            for j, other in enumerate(tracks[b].visits):
+                if len(np.intersect1d(visit.scans, other.scans)):
+                    found[a].append((i, b, j))
+    return found
+
+
+def _best_alone(track: Track) -> float:
+    return max(sum(float(scores.max()) for scores in family.scores) for family in track.families)
+
+
+def _again(a: Track, b: Track, tracks: Mapping[str, Track], at_once: _Shared) -> bool:
+    """Both anew, one after the other in both orders; whether that was better."""
+    kept = (a.chosen, b.chosen)
+    best, found = _joint(a, b, tracks, at_once), kept
+    for first, second in ((a, b), (b, a)):
+        a.chosen = b.chosen = None
+        _solve(first, tracks, at_once)
+        _solve(second, tracks, at_once)
+        _solve(first, tracks, at_once)
+        total = _joint(a, b, tracks, at_once)
+        if total > best + _SAME_SCORE:
+            best, found = total, (a.chosen, b.chosen)
+    a.chosen, b.chosen = found
+    return found is not kept
+
+
+def _joint(a: Track, b: Track, tracks: Mapping[str, Track], at_once: _Shared) -> float:
+    """Of two tracks as chosen; what they share counts once."""
+    _, alone = _viterbi(a, tracks, at_once, fixed=a.chosen, without=b.tag)
+    _, other = _viterbi(b, tracks, at_once, fixed=b.chosen)
+    return alone + other
+
+
+def _solve(track: Track, tracks: Mapping[str, Track], at_once: _Shared) -> None:
+    track.chosen, track.total = _viterbi(track, tracks, at_once)
+
+
+def _viterbi(
+    track: Track, tracks: Mapping[str, Track], at_once: _Shared, *, fixed: Floats | None = None, without: str = ""
+) -> tuple[Floats, float]:
+    best, found = -np.inf, np.empty((0, 3))
+    for family in track.families:
+        costs = []
+        for number, (poses, scores) in enumerate(zip(family.poses, family.scores, strict=True)):
+            score = scores - _shared(track, number, poses, tracks, at_once, without)
+            if fixed is not None:
+                score = np.where((poses == fixed[number]).all(axis=1), score, -np.inf)
+            costs.append(score)
+        if fixed is not None and any(np.isneginf(score).all() for score in costs):
+            continue
+        total, back = costs[0], []
+        for number in range(1, len(costs)):
+            step = total[:, None] + _stays(track, number, family)
+            back.append(np.argmax(step, axis=0))
+            total = step.max(axis=0) + costs[number]
+        last = int(np.argmax(total))
+        if total[last] > best:
+            best = float(total[last])
+            picked = [last]
+            for pointers in reversed(back):
+                picked.append(int(pointers[picked[-1]]))
+            found = np.array([family.poses[n][i] for n, i in enumerate(reversed(picked))])
+    return found, best
+
+
+def _stays(track: Track, number: int, family: Family) -> Floats:
+    """(C, D) what it is worth that the pose before visit ``number`` is the pose in it."""
+    before, after = family.poses[number - 1], family.poses[number]
+    apart = after[None, :, :] - before[:, None, :]
+    same = (np.hypot(apart[..., 0], apart[..., 1]) < SAME_M) & (np.abs(wrapped(apart[..., 2])) < SAME_RAD)
+    bonus = _SAME_PASS if track.visits[number].leg == track.visits[number - 1].leg else _SAME_PLACE
+    found: Floats = bonus * same
+    return found
+
+
+def _shared(
+    track: Track, number: int, poses: Floats, tracks: Mapping[str, Track], at_once: _Shared, without: str
+) -> Floats:
+    """(C,) what other objects at the same time already explain."""
+    total: Floats = np.zeros(len(poses))
+    for mine, tag, theirs in at_once[track.tag]:
+        chosen = tracks[tag].chosen
+        if mine != number or chosen is None or tag == without:
+            continue
+        tree = tracks[tag].tree(chosen[theirs])
+        near = np.hypot(*(poses[:, :2] - chosen[theirs, :2]).T) < track.shape.size + tracks[tag].shape.size
+        for n in np.flatnonzero(near):
+            apart, _ = tree.query(track.outline(poses[n]), distance_upper_bound=_SHARED_M)
+            total[n] += _SHARED * np.count_nonzero(np.isfinite(apart))
+    return total

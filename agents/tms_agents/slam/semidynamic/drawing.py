@@ -1,0 +1,90 @@
+"""The map as it is at the end: what does not move from all scans, what moves from where it stands.
+
+Beams that ended on an object are left out of the grid and the object is drawn from its pose: so nothing stays behind
+where it was, not even where no beam ever passed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tms_agents.slam.geometry import Floats, transform
+from tms_agents.slam.gridmap import GridMap, grid_map, render
+from tms_agents.slam.keyframes import key_scans
+from tms_agents.slam.logs import Log
+from tms_agents.slam.occupancy import HIGHEST
+from tms_agents.slam.semidynamic.evidence import CELL_M, Place, count_beams
+from tms_agents.slam.semidynamic.models import Models
+from tms_agents.slam.semidynamic.shapes import surface
+from tms_agents.slam.semidynamic.solving import Stay
+from tms_agents.slam.semidynamic.visits import passes_of
+
+#: Beams that end so near to an outline (m) are the object's.
+_OWN_M = 0.08
+#: Scans that are drawn: one every so much (m, rad).
+_STEP_M, _STEP_RAD, _REACH_M = 0.1, 0.1, 0.2
+#: What was not read any more has gone if so large a share of its outline was seen through by so many beams.
+_SEEN_THROUGH, _ENOUGH = 0.5, 4
+
+
+def draw(log: Log, poses: Floats, stays: Mapping[str, Sequence[Stay]], models: Models, resolution: float) -> GridMap:
+    """Cells of ``resolution`` m, with the objects where they stood last."""
+    scans = key_scans(log, _STEP_M, _STEP_RAD)
+    legs = passes_of(log.t)
+    points = [_static(log, poses, int(n), legs, stays, models) for n in scans]
+    grid = grid_map(render(poses[scans], points, log.laser[:2], resolution, _REACH_M), 0)
+    cells = grid.cells.copy()
+    for tag, found in stays.items():
+        outline = surface(models.objects[tag], found[-1].pose)
+        if _gone(log, poses, legs, found[-1], outline):
+            continue
+        at = np.floor((outline - np.array(grid.origin)) / resolution).astype(int)
+        inside = ((at >= 0) & (at < np.array(cells.shape[::-1]))).all(axis=1)
+        cells[at[inside, 1], at[inside, 0]] = HIGHEST
+    return GridMap(cells, grid.origin, resolution)
+
+
+def _static(
+    log: Log,
+    poses: Floats,
+    n: int,
+    legs: NDArray[np.int64],
+    stays: Mapping[str, Sequence[Stay]],
+    models: Models,
+) -> Floats:
+    """Points of scan ``n``, seen from the robot, that are no object's."""
+    points = log.points(n)
+    there = transform(poses[n], points)
+    kept = np.ones(len(points), dtype=np.bool_)
+    for tag, found in stays.items():
+        stay = stay_at(found, n, legs)
+        if stay is None:
+            continue
+        outline = surface(models.objects[tag], stay.pose)
+        near = kept & (np.hypot(*(there - outline.mean(axis=0)).T) < 2.0)
+        if near.any():
+            apart, _ = cKDTree(outline).query(there[near], distance_upper_bound=_OWN_M)
+            kept[np.flatnonzero(near)[np.isfinite(apart)]] = False
+    return points[kept]
+
+
+def stay_at(stays: Sequence[Stay], n: int, legs: NDArray[np.int64]) -> Stay | None:
+    """Where an object stood at scan ``n``: its stay of that leg that was nearest in time, if there is one."""
+    same = [stay for stay in stays if stay.visit.leg == legs[n] and len(stay.visit.scans)]
+    return min(same, key=lambda stay: int(np.abs(stay.visit.scans - n).min()), default=None)
+
+
+def _gone(log: Log, poses: Floats, legs: NDArray[np.int64], last: Stay, outline: Floats) -> bool:
+    """Whether beams of later legs went through where it was seen last; what is hidden is still there."""
+    later = np.flatnonzero(legs > last.visit.leg)
+    if not len(later):
+        return False
+    place = Place.around(outline, 0.1)
+    beams = count_beams(place, log, poses, later)
+    at = ((outline - place.corner) / CELL_M).astype(int)
+    through = beams.passes[at[:, 1], at[:, 0]] >= _ENOUGH * (1 + beams.hits[at[:, 1], at[:, 0]])
+    return float(through.mean()) > _SEEN_THROUGH
