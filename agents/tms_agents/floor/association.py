@@ -14,7 +14,7 @@ from tms_agents.floor.freespace import FREE, clear
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.shine import learn
+from tms_agents.floor.shine import expected, learn, scatter
 from tms_agents.floor.state import BODY, empty
 
 Array = NDArray[np.float64]
@@ -219,6 +219,7 @@ def _advance(
     clusters: Any,
     of: NDArray[np.int64],
     marks: Array,
+    scattered: Array,
     blank: Any,
     prints: Any,
     t: float,
@@ -293,7 +294,8 @@ def _advance(
         score = child_score[o] - least + missed
         for j in range(kept):
             if _same(spare[j], bodies, other_of):
-                unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, score - scores[j], scratch)
+                worse = score - scores[j]
+                unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, worse, scattered, scratch)
                 known_already = True
                 break
         if known_already:
@@ -323,6 +325,7 @@ class Association:
         self._names = np.zeros(most, np.int64)
         self._scores = np.zeros(_KEPT)
         self._count = 1
+        self.scattered = expected()
         self.bodies = self._hypotheses[0]
 
     def step(
@@ -340,12 +343,14 @@ class Association:
             clusters,
             of,
             marks,
+            self.scattered,
             _BLANK,
             prints,
             t,
             sight,
             taken,
         )
+        scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return taken
 
     def decide(self) -> None:
@@ -360,7 +365,7 @@ class Association:
 
     def rename(self, t: float) -> None:
         """Give people their own names back."""
-        if not renamed(self.bodies, self._beliefs[0], t, self._names):
+        if not renamed(self.bodies, self._beliefs[0], t, self.scattered, self._names):
             return
         changed = np.flatnonzero(self._names != np.arange(self._names.size))
         source = self._names[changed]

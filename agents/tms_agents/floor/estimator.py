@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 #: As many as there can be at once.
 _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
+#: Of saved states; 2: how brightness scatters.
+_FORMAT = 2
 
 
 class FloorEstimator:
@@ -117,7 +119,8 @@ class FloorEstimator:
         follow(clusters, of, prints, view.index, t, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
         marks = self._marks[:feet]
-        measure(clusters[:feet], view.ranges, lights, view.sensor.sweep.time_increment_s, marks)
+        increment_s = view.sensor.sweep.time_increment_s
+        measure(clusters[:feet], view.ranges, lights, increment_s, self._association.scattered, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks, prints, t, view.sight)
         if recognize(bodies, *self._robots):
@@ -195,10 +198,11 @@ class FloorEstimator:
                 "last": view.last,
             }
         return {
-            "format": 1,
+            "format": _FORMAT,
             "sensors": sensors,
             "bodies": pack(self._tracks.bodies),
             "absent": self._tracks.absent.save(),
+            "scattered": pack(self._association.scattered),
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
@@ -221,7 +225,7 @@ class FloorEstimator:
         Raises:
             ValueError: the state is damaged, of another format, or of other sensors.
         """
-        if state.get("format") != 1:
+        if state.get("format") != _FORMAT:
             raise ValueError("the saved state of the floor estimator has a format that this version does not know")
         self = cls(sensors, settings, scene)
         try:
@@ -236,6 +240,7 @@ class FloorEstimator:
                 view.move(tuple(saved["pose"]))
             self._tracks.bodies[:] = unpack(state["bodies"], self._tracks.bodies)
             self._tracks.absent.restore(state["absent"])
+            self._association.scattered[:] = unpack(state["scattered"], self._association.scattered)
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}

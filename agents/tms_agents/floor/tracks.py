@@ -339,7 +339,7 @@ class Tracks:
             body["from_furniture"] = -1
         old = self._missing(body)
         if old is None:
-            old = self.absent.find(body)
+            old = self.absent.find(body, self._association.scattered)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
             for field in ("own", "own_n", "own_pace", "own_pace_n"):
