@@ -271,18 +271,23 @@ class Objects:
 
     def _attend(self, bodies: Any, t: float) -> None:
         """Remember who came near an object while it was not seen: that is who may have taken it."""
-        used = self.things["used"] == 1
-        for index in np.flatnonzero(used).tolist():
-            thing = self.things[index]
-            label = int(thing["label"])
-            if thing["seen"] == t:
+        used = np.flatnonzero(self.things["used"] == 1)
+        present = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1))
+        dx = np.subtract.outer(self.things["x"][used], bodies["x"][present])
+        dy = np.subtract.outer(self.things["y"][used], bodies["y"][present])
+        away = np.hypot(dx, dy)
+        movers = bodies["label"][present].tolist()
+        rows = zip(self.things["label"][used].tolist(), self.things["seen"][used].tolist(), away.tolist(), strict=True)
+        for label, seen, gaps in rows:
+            near = [(gap, mover) for gap, mover in zip(gaps, movers, strict=True) if gap < _FAR_M]
+            if seen == t:
                 # Whoever was near when it was last seen: kept from this scan on.
                 self.visitors.pop(label, None)
-                if not _any_near(bodies, thing["x"], thing["y"]):
+                if not near:
                     continue
             visitors = self.visitors.setdefault(label, {})
-            for near, mover in near_movers(bodies, float(thing["x"]), float(thing["y"])):
-                visitors[mover] = min(near, visitors.get(mover, math.inf))
+            for gap, mover in near:
+                visitors[mover] = min(gap, visitors.get(mover, math.inf))
 
 
 def near_movers(bodies: Any, x: float, y: float) -> list[tuple[float, int]]:
@@ -290,10 +295,6 @@ def near_movers(bodies: Any, x: float, y: float) -> list[tuple[float, int]]:
     present = (bodies["used"] == 1) & (bodies["confirmed"] == 1)
     away = np.hypot(bodies["x"] - x, bodies["y"] - y)
     return [(float(away[b]), int(bodies["label"][b])) for b in np.flatnonzero(present & (away < _FAR_M)).tolist()]
-
-
-def _any_near(bodies: Any, x: float, y: float) -> bool:
-    return bool(near_movers(bodies, x, y))
 
 
 def _candidates(visitors: dict[int, float]) -> Candidates:
