@@ -169,9 +169,10 @@ def _learn(
 ) -> None:
     """Update the components in place, except of the beams in ``keep`` (n,): those show something known.
 
-    usual: by how much this scan counts, slow: where it shows something nearer than the background; pull: by how much the nearest component follows. ``beyond`` (n,) s counts how
-    long a beam has passed its background and ``beyond_at`` (n,) m where to: then the background there has gone.
-    ``missing`` (n, k) s is for how long beams have passed the place of a component since it was last seen.
+    usual: by how much this scan counts, slow: where it shows something nearer than the background; pull: by how much
+    the nearest component follows. ``beyond`` (n,) s counts how long a beam has passed its background and ``beyond_at``
+    (n,) m where to: then the background there has gone. ``missing`` (n, k) s is for how long beams have passed the
+    place of a component since it was last seen.
     """
     n, k = centre.shape
     for i in range(n):
