@@ -131,8 +131,6 @@ class Furniture:
             if any(math.hypot(piece.x - x, piece.y - y) < 0.05 for _, x, y in self._found):
                 continue
             thin = width < _THIN_M
-            if thin and print_["given"] == 1:
-                continue
             if print_["first"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
                 thin and not self._grouped(piece, pieces)
             ):
@@ -140,7 +138,8 @@ class Furniture:
             least = _THIN_WIDTH_M if thin else _WIDTH_M
             difference = abs(piece.width - width) / (least + 0.15 * max(piece.width, width) + spacing)
             cost = 0.3 * math.hypot(piece.x - print_["x"], piece.y - print_["y"]) / _PUSHED_M + 0.7 * difference
-            if difference < 1.0 and cost < best_cost:
+            # What somebody put down must look just like the piece.
+            if difference < (0.5 if print_["given"] == 1 else 1.0) and cost < best_cost:
                 best, best_cost = piece, cost
         if best is None:
             return False
