@@ -331,7 +331,7 @@ class Association:
     def step(
         self, clusters: Any, of: NDArray[np.int64], marks: Array, prints: Any, t: float, sight: Any
     ) -> NDArray[np.bool_]:
-        """Take in the clusters (m,) of a scan, their prints ``of`` (m,) and ``marks`` (m, 3), `View.sight`: whose."""
+        """Take in the clusters (m,) of a scan, their prints ``of`` (m,) and ``marks`` (m, 4), `View.sight`: whose."""
         taken = np.zeros(clusters.size, np.bool_)
         self._count = _advance(
             self._hypotheses,

@@ -61,7 +61,7 @@ class FloorEstimator:
         self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
-        self._marks = np.zeros((256, 3))
+        self._marks = np.zeros((256, 4))
         self._labels = 0
         self._t = -np.inf
 

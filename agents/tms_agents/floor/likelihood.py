@@ -127,7 +127,7 @@ def costs(
                 continue
             speed = np.hypot(body.vx, body.vy)
             base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
-            shape = unlike(body, marks[i, 0], marks[i, 1])
+            shape = unlike(body, marks[i])
             if c.width > WIDE_M:
                 shape += 3.0
                 if c.width > _BROAD_M and body.hits > 15:

@@ -20,8 +20,9 @@ _PATCHES, _BEAM, _PEOPLE = 0.12, 0.15, 0.4
 _MEMORY, _LEAST = 40, 4
 #: So many sightings make somebody's own look.
 _LIFE = 1200
-#: Scans of one foot resemble each other: each tells so much only, and nothing tells more than so many deviations.
-_SHARE, _FAR = 0.5, 3.5
+#: Scans of one foot resemble each other: each tells so much only, more where shoes are even, since what is left then
+#: is the noise of beams, new in every scan; and nothing tells more than so many deviations.
+_SHARE, _EVEN, _FAR = 0.5, 0.35, 3.5
 #: Standard deviation of somebody's look as he turns, at first; what was expected counts like so many sightings, and
 #: never more than so many are remembered; nothing is known better than this (share of what was expected, deviation).
 _TURNS, _PRIOR, _LONG = 0.08, 40.0, 3000.0
@@ -39,8 +40,8 @@ def expected() -> Array:
 def measure(
     clusters: Any, ranges: Array, intensities: Array, increment_s: float, scattered: Array, marks: Array
 ) -> None:
-    """Fill ``marks`` (m, 3): logarithm of the brightness of each cluster at one metre (NaN: unknown), its variance, and
-    when it was seen, s into the sweep.
+    """Fill ``marks`` (m, 4): logarithm of the brightness of each cluster at one metre (NaN: unknown), its variance,
+    when it was seen, s into the sweep, and how much one scan tells.
 
     ``intensities`` (n,) in any unit that grows in proportion to the light; empty where the sensor gives none.
     ``scattered`` (3,) is what `scatter` has learned.
@@ -49,6 +50,7 @@ def measure(
         c = clusters[k]
         marks[k, 0], marks[k, 1] = np.nan, 1.0
         marks[k, 2] = 0.5 * increment_s * (c.first + c.last)
+        marks[k, 3] = _SHARE + _EVEN * max(1.0 - scattered[0], 0.0)
         if intensities.size == 0:
             continue
         total, best, count = 0.0, -np.inf, 0
@@ -65,13 +67,14 @@ def measure(
 
 
 @njit(cache=True)
-def unlike(body: Any, value: float, variance: float) -> float:
-    """Negative log likelihood ratio, of one scan, of this brightness (mean, variance) at this body or at anybody."""
+def unlike(body: Any, mark: Array) -> float:
+    """Negative log likelihood ratio, of one scan, of a brightness (`measure`, (4,)) at this body or at anybody."""
+    value, variance = mark[0], mark[1]
     if np.isnan(value) or body.shine_n < _LEAST:
         return 0.0
     variance *= 1.0 + 1.0 / body.shine_n
     off = min((value - body.shine) ** 2 / variance, _FAR**2)
-    return float(_SHARE * (0.5 * off + 0.5 * np.log(variance / (_PEOPLE**2 + variance))))
+    return float(mark[3] * (0.5 * off + 0.5 * np.log(variance / (_PEOPLE**2 + variance))))
 
 
 @njit(cache=True)

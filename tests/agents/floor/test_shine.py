@@ -15,9 +15,13 @@ VARIANCE = 0.01
 def marks_of(ranges: np.ndarray, intensities: np.ndarray) -> np.ndarray:
     clusters = np.zeros(1, CLUSTER)
     clusters["last"], clusters["near"] = len(ranges) - 1, ranges.mean()
-    marks = np.zeros((1, 3))
+    marks = np.zeros((1, 4))
     measure(clusters, ranges, intensities, 1e-4, expected(), marks)
     return marks[0]
+
+
+def mark(value: float) -> np.ndarray:
+    return np.array([value, VARIANCE, 0.0, 0.5])
 
 
 def people(*brightness: float):
@@ -39,12 +43,12 @@ def test_the_same_shoe_is_as_bright_near_and_far() -> None:
 def test_a_sensor_without_intensities_tells_people_not_apart() -> None:
     marks = marks_of(np.full(9, 1.0), np.zeros(0))
     assert np.isnan(marks[0])
-    assert unlike(people(7.0)[0], marks[0], marks[1]) == 0.0
+    assert unlike(people(7.0)[0], marks) == 0.0
 
 
 def test_somebody_of_another_brightness_is_less_likely() -> None:
     (body,) = people(7.0)
-    assert unlike(body, 7.0, VARIANCE) < 0.0 < unlike(body, 6.3, VARIANCE)
+    assert unlike(body, mark(7.0)) < 0.0 < unlike(body, mark(6.3))
 
 
 def test_what_is_known_of_a_name_that_is_unsure_stays() -> None:
@@ -66,7 +70,7 @@ def watched(deviation: float, beside: float = 3.0) -> np.ndarray:
     for scan in range(600):
         t = 0.1 * scan
         bodies["seen"] = t
-        marks = np.array([[7.0 + deviation * random.normal(), learned[0] * VARIANCE, 0.0]])
+        marks = np.array([[7.0 + deviation * random.normal(), learned[0] * VARIANCE, 0.0, 0.5]])
         learn(bodies[0], *marks[0, :2])
         scatter(bodies, clusters, np.array([0]), marks, t, learned)
     return learned
