@@ -15,7 +15,7 @@ from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn, scatter
-from tms_agents.floor.state import BODY, empty
+from tms_agents.floor.state import BODY, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -377,3 +377,24 @@ class Association:
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""
         self._hypotheses["used"][: self._count, index] = 0
+
+    def save(self) -> dict[str, Any]:
+        """JSON values: all hypotheses, and what is known of brightness."""
+        n = self._count
+        return {
+            "count": n,
+            "bodies": pack(self._hypotheses[:n]),
+            "beliefs": pack(self._beliefs[:n]),
+            "scores": pack(self._scores[:n]),
+            "scattered": pack(self.scattered),
+        }
+
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        n = int(saved["count"])
+        if not 1 <= n <= _KEPT:
+            raise ValueError("the saved state of the floor estimator has an impossible number of hypotheses")
+        self._count = n
+        for name, array in (("bodies", self._hypotheses), ("beliefs", self._beliefs), ("scores", self._scores)):
+            array[:n] = unpack(saved[name], array[:n])
+        self.scattered[:] = unpack(saved["scattered"], self.scattered)

@@ -32,7 +32,7 @@ _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
 #: In a door somebody may wait for so long (s).
 _WAITS_S = 25.0
-#: Of saved states; 2: how brightness scatters.
+#: Of saved states; 2: all hypotheses, and how brightness scatters.
 _FORMAT = 2
 
 
@@ -206,9 +206,8 @@ class FloorEstimator:
         return {
             "format": _FORMAT,
             "sensors": sensors,
-            "bodies": pack(self._tracks.bodies),
+            "association": self._association.save(),
             "absent": self._tracks.absent.save(),
-            "scattered": pack(self._association.scattered),
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
@@ -245,9 +244,8 @@ class FloorEstimator:
                 view.background.restore(arrays, saved)
                 view.last = saved["last"]
                 view.move(tuple(saved["pose"]))
-            self._tracks.bodies[:] = unpack(state["bodies"], self._tracks.bodies)
+            self._association.restore(state["association"])
             self._tracks.absent.restore(state["absent"])
-            self._association.scattered[:] = unpack(state["scattered"], self._association.scattered)
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
