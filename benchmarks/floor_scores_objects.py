@@ -37,7 +37,7 @@ _FOOT_S = 2.0
 class Span:
     """What became of one stay. Seconds and metres, NaN or 0 where it does not apply.
 
-    ``met_s``: for how long any beam met it.
+    ``met_s``: for how long any beam met it; ``clear_s``: for how long two did at once.
     ``latency_s`` from when it could be seen; ``kept_s`` of ``hidden_s`` the label was there although nothing met the
     thing for a second or more; ``removal_s`` from when its place was clear, NaN where it stayed or that is unknown.
     """
@@ -46,6 +46,7 @@ class Span:
     size: float
     found: bool
     met_s: float = math.inf
+    clear_s: float = math.inf
     latency_s: float = math.nan
     error_m: float = math.nan
     breaks: int = 0
@@ -87,14 +88,15 @@ class ObjectScores:
             self.moves + other.moves,
         )
 
-    def recall(self, smallest: float = 0.0, largest: float = math.inf) -> float:
-        """Share of the spans to be found, of things of these sizes, that were found; NaN of none."""
-        these = [span.found for span in self.needed(smallest, largest)]
+    def recall(self, smallest: float = 0.0, largest: float = math.inf, clear_s: float = 0.0) -> float:
+        """Share of the spans to be found (`needed`) that were found; NaN of none."""
+        these = [span.found for span in self.needed(smallest, largest, clear_s)]
         return float(np.mean(these)) if these else math.nan
 
-    def needed(self, smallest: float = 0.0, largest: float = math.inf) -> list[Span]:
-        """The spans of things of these sizes that could be found."""
-        return [span for span in self.spans if span.needed and smallest <= span.size <= largest]
+    def needed(self, smallest: float = 0.0, largest: float = math.inf, clear_s: float = 0.0) -> list[Span]:
+        """The spans of things of these sizes, in sight of two beams for so long, that could be found."""
+        these = [span for span in self.spans if span.needed and span.clear_s >= clear_s]
+        return [span for span in these if smallest <= span.size <= largest]
 
     @property
     def glimpsed(self) -> list[Span]:
@@ -178,7 +180,8 @@ def score_objects(truth: Truth, prediction: Prediction) -> ObjectScores:
             mine = [tracks[labels[j]] for j in range(len(labels)) if gaps[i, j] < _NO / 2]
             results.append(_followed(thing, span, tracks[labels[best[i]]], mine, told_at, end))
         else:
-            results.append(Span(thing=thing["id"], size=thing["size"], found=False, met_s=_met_s(span, end)))
+            one, two = _met_s(span, end), _clear_s(span, end)
+            results.append(Span(thing=thing["id"], size=thing["size"], found=False, met_s=one, clear_s=two))
     nobodys = [tracks[label] for j, label in enumerate(labels) if not (gaps[:, j] < _NO / 2).any()]
     step = (told_at[-1] - told_at[0]) / max(len(told_at) - 1, 1)
     false = [
@@ -230,6 +233,7 @@ def _followed(
         size=thing["size"],
         found=True,
         met_s=_met_s(span, end),
+        clear_s=_clear_s(span, end),
         latency_s=max(0.0, float(min(track[0, 0] for track in mine)) - first),
         error_m=float(np.median(errors)) if len(errors) else math.nan,
         breaks=len(mine) - 1,
@@ -242,8 +246,11 @@ def _followed(
 
 def _met_s(span: Mapping[str, Any], end: float) -> float:
     """For how long a beam met it; older recordings tell only for which share of the time two did."""
-    if "met_s" in span:
-        return float(span["met_s"])
+    return float(span["met_s"]) if "met_s" in span else _clear_s(span, end)
+
+
+def _clear_s(span: Mapping[str, Any], end: float) -> float:
+    """For how long two beams met it at once."""
     during = (span["t_picked"] or end) - span["t_placed"]
     return float(span.get("visible_fraction", 1.0) * during)
 

@@ -6,11 +6,14 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
 from tms_agents.floor.state import BODY, empty, pack, unpack
+
+Array = NDArray[np.float64]
 
 #: So near a door (m) people come and go.
 _DOOR_M = 1.0
@@ -46,8 +49,8 @@ class Absent:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
         self._bodies = list(unpack(saved, empty(BODY, int(saved["shape"][0]))))
 
-    def find(self, body: Any) -> Any:
-        """Who of those waited for this new one most probably is, or None."""
+    def find(self, body: Any, scattered: Array) -> Any:
+        """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `alike` takes."""
         x, y = float(body["x0"]), float(body["y0"])
         if not self._bodies or body["wide"] > 0.3 or self._gates.distance(x, y) < _DOOR_M:
             return None
@@ -55,7 +58,7 @@ class Absent:
         for index, one in enumerate(self._bodies):
             since = max(0.0, float(body["first"]) - float(one["seen"]))
             gap = math.hypot(x - float(one["x"]), y - float(one["y"])) / (_AWAY_M + _SPEED * since)
-            likely = float(alike(body, one))
+            likely = float(alike(body, one, scattered))
             cost = 0.5 * gap + 0.5 * likely / _UNLIKE
             if gap < 1.0 and likely > _UNLIKE and cost < best_cost:
                 best, best_cost = index, cost

@@ -14,8 +14,8 @@ from tms_agents.floor.freespace import FREE, clear
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.shine import learn
-from tms_agents.floor.state import BODY, empty
+from tms_agents.floor.shine import expected, learn, scatter
+from tms_agents.floor.state import BODY, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -219,6 +219,7 @@ def _advance(
     clusters: Any,
     of: NDArray[np.int64],
     marks: Array,
+    scattered: Array,
     blank: Any,
     prints: Any,
     t: float,
@@ -293,7 +294,8 @@ def _advance(
         score = child_score[o] - least + missed
         for j in range(kept):
             if _same(spare[j], bodies, other_of):
-                unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, score - scores[j], scratch)
+                worse = score - scores[j]
+                unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, worse, scattered, scratch)
                 known_already = True
                 break
         if known_already:
@@ -323,12 +325,13 @@ class Association:
         self._names = np.zeros(most, np.int64)
         self._scores = np.zeros(_KEPT)
         self._count = 1
+        self.scattered = expected()
         self.bodies = self._hypotheses[0]
 
     def step(
         self, clusters: Any, of: NDArray[np.int64], marks: Array, prints: Any, t: float, sight: Any
     ) -> NDArray[np.bool_]:
-        """Take in the clusters (m,) of a scan, their prints ``of`` (m,) and ``marks`` (m, 3), `View.sight`: whose."""
+        """Take in the clusters (m,) of a scan, their prints ``of`` (m,) and ``marks`` (m, 4), `View.sight`: whose."""
         taken = np.zeros(clusters.size, np.bool_)
         self._count = _advance(
             self._hypotheses,
@@ -340,12 +343,14 @@ class Association:
             clusters,
             of,
             marks,
+            self.scattered,
             _BLANK,
             prints,
             t,
             sight,
             taken,
         )
+        scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return taken
 
     def decide(self) -> None:
@@ -360,7 +365,7 @@ class Association:
 
     def rename(self, t: float) -> None:
         """Give people their own names back."""
-        if not renamed(self.bodies, self._beliefs[0], t, self._names):
+        if not renamed(self.bodies, self._beliefs[0], t, self.scattered, self._names):
             return
         changed = np.flatnonzero(self._names != np.arange(self._names.size))
         source = self._names[changed]
@@ -372,3 +377,24 @@ class Association:
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""
         self._hypotheses["used"][: self._count, index] = 0
+
+    def save(self) -> dict[str, Any]:
+        """JSON values: all hypotheses, and what is known of brightness."""
+        n = self._count
+        return {
+            "count": n,
+            "bodies": pack(self._hypotheses[:n]),
+            "beliefs": pack(self._beliefs[:n]),
+            "scores": pack(self._scores[:n]),
+            "scattered": pack(self.scattered),
+        }
+
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        n = int(saved["count"])
+        if not 1 <= n <= _KEPT:
+            raise ValueError("the saved state of the floor estimator has an impossible number of hypotheses")
+        self._count = n
+        for name, array in (("bodies", self._hypotheses), ("beliefs", self._beliefs), ("scores", self._scores)):
+            array[:n] = unpack(saved[name], array[:n])
+        self.scattered[:] = unpack(saved["scattered"], self.scattered)

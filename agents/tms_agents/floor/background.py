@@ -151,7 +151,8 @@ def _whole(
 def _learn(
     ranges: Array,
     keep: NDArray[np.bool_],
-    rate: float,
+    usual: float,
+    slow: float,
     pull: float,
     dt: float,
     raise_after: float,
@@ -168,13 +169,15 @@ def _learn(
 ) -> None:
     """Update the components in place, except of the beams in ``keep`` (n,): those show something known.
 
-    rate: by how much this scan counts; pull: by how much the nearest component follows. ``beyond`` (n,) s counts how
-    long a beam has passed its background and ``beyond_at`` (n,) m where to: then the background there has gone.
-    ``missing`` (n, k) s is for how long beams have passed the place of a component since it was last seen.
+    usual: by how much this scan counts, slow: where it shows something nearer than the background; pull: by how much
+    the nearest component follows. ``beyond`` (n,) s counts how long a beam has passed its background and ``beyond_at``
+    (n,) m where to: then the background there has gone. ``missing`` (n, k) s is for how long beams have passed the
+    place of a component since it was last seen.
     """
     n, k = centre.shape
     for i in range(n):
         r = ranges[i]
+        rate = slow if states[i] == FOREGROUND else usual
         if keep[i] or np.isnan(r):
             continue
         if np.isinf(r):
@@ -312,12 +315,14 @@ class Background:
         dt = min(dt, 1.0)
         self.seconds += dt
         rate = max(1.0 / self._scans, dt / self._settings.forget_s)
+        slow = dt / self._settings.forget_s
         if not self.learned:
-            rate = 1.0 / self._scans
+            rate = slow = 1.0 / self._scans
         _learn(
             ranges,
             keep,
             rate,
+            slow,
             min(1.0, dt / self._settings.drift_s),
             dt,
             self._settings.raise_s,

@@ -14,7 +14,7 @@ from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
-from tms_agents.floor.masks import Masks
+from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects, candidates, near_movers
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
@@ -30,6 +30,10 @@ Array = NDArray[np.float64]
 #: As many as there can be at once.
 _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
+#: In a door somebody may wait for so long (s).
+_WAITS_S = 25.0
+#: Of saved states; 2: all hypotheses, and how brightness scatters.
+_FORMAT = 2
 
 
 class FloorEstimator:
@@ -47,6 +51,7 @@ class FloorEstimator:
             for index, (name, sensor) in enumerate(sensors.items())
         }
         self._masks = Masks(self._scene.region, self._scene.masks)
+        self._gates = Area(self._scene.gates)
         self._prints = empty(PRINT, _PRINTS)
         self._association = Association(_BODIES)
         self._tracks = Tracks(self._association, self._settings, self._scene)
@@ -56,7 +61,7 @@ class FloorEstimator:
         self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
-        self._marks = np.zeros((256, 3))
+        self._marks = np.zeros((256, 4))
         self._labels = 0
         self._t = -np.inf
 
@@ -117,7 +122,8 @@ class FloorEstimator:
         follow(clusters, of, prints, view.index, t, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
         marks = self._marks[:feet]
-        measure(clusters[:feet], view.ranges, lights, view.sensor.sweep.time_increment_s, marks)
+        increment_s = view.sensor.sweep.time_increment_s
+        measure(clusters[:feet], view.ranges, lights, increment_s, self._association.scattered, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks, prints, t, view.sight)
         if recognize(bodies, *self._robots):
@@ -149,7 +155,10 @@ class FloorEstimator:
     def _settle(self, index: int, kind: int, t: float) -> list[FloorEvent]:
         """A print rests: it is an object or furniture."""
         q = self._prints[index]
-        if self._masks.outside(float(q["x"]), float(q["y"])) or (kind == OBJECT and self._objects.at(q)):
+        x, y = float(q["x"]), float(q["y"])
+        if self._masks.outside(x, y) or (kind == OBJECT and self._objects.at(q)):
+            return []
+        if kind == OBJECT and not q["given"] and t - q["first"] < _WAITS_S and self._gates.distance(x, y) == 0.0:
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s
@@ -195,13 +204,14 @@ class FloorEstimator:
                 "last": view.last,
             }
         return {
-            "format": 1,
+            "format": _FORMAT,
             "sensors": sensors,
-            "bodies": pack(self._tracks.bodies),
+            "association": self._association.save(),
             "absent": self._tracks.absent.save(),
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
+            "robot_at": self._objects.robot_at if np.isfinite(self._objects.robot_at) else None,
             "furniture": self._furniture.save(),
             "extrinsics": self._extrinsics.save(),
             "labels": self._labels,
@@ -221,7 +231,7 @@ class FloorEstimator:
         Raises:
             ValueError: the state is damaged, of another format, or of other sensors.
         """
-        if state.get("format") != 1:
+        if state.get("format") != _FORMAT:
             raise ValueError("the saved state of the floor estimator has a format that this version does not know")
         self = cls(sensors, settings, scene)
         try:
@@ -234,11 +244,12 @@ class FloorEstimator:
                 view.background.restore(arrays, saved)
                 view.last = saved["last"]
                 view.move(tuple(saved["pose"]))
-            self._tracks.bodies[:] = unpack(state["bodies"], self._tracks.bodies)
+            self._association.restore(state["association"])
             self._tracks.absent.restore(state["absent"])
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
+            self._objects.robot_at = -np.inf if state["robot_at"] is None else float(state["robot_at"])
             self._furniture.restore(state["furniture"])
             self._extrinsics.restore(state["extrinsics"])
             self._labels = int(state["labels"])

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 #: A thin piece (m), like the leg of a chair, tells only together with another so near it (m) that went so soon (s).
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
+#: Its width is the same within this (m) and as far as the beams tell.
+_THIN_WIDTH_M = 0.01
 #: The legs of a chair that was moved stand still within so long (s).
 _TOGETHER_S = 2.0
 #: The ranges of one surface differ so little from beam to beam (m).
@@ -133,9 +135,11 @@ class Furniture:
                 thin and not self._grouped(piece, pieces)
             ):
                 continue
-            difference = abs(piece.width - width) / (_WIDTH_M + 0.15 * max(piece.width, width) + spacing)
+            least = _THIN_WIDTH_M if thin else _WIDTH_M
+            difference = abs(piece.width - width) / (least + 0.15 * max(piece.width, width) + spacing)
             cost = 0.3 * math.hypot(piece.x - print_["x"], piece.y - print_["y"]) / _PUSHED_M + 0.7 * difference
-            if difference < 1.0 and cost < best_cost:
+            # What somebody put down must look just like the piece.
+            if difference < (0.5 if print_["given"] == 1 else 1.0) and cost < best_cost:
                 best, best_cost = piece, cost
         if best is None:
             return False

@@ -19,8 +19,8 @@ from tms_agents.floor.gait import SHOES
 
 Array = NDArray[np.float64]
 
-#: Standard deviations of the logarithm of the brightness: one sighting, and somebody as he turns.
-_PATCHES, _LOOKS = 0.12, 0.08
+#: Standard deviation of the logarithm of the brightness in one sighting, at first (`shine.scatter`).
+_PATCHES = 0.12
 #: Standard deviations (s) of one stance, seen of a shoe or of a leg, and of how somebody walks of late; nothing tells
 #: more than so many deviations.
 _PACE, _PACE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
@@ -33,11 +33,14 @@ _UNNOTICED, _DOUBT, _SURE = 0.1, 0.02, 1.5
 
 
 @njit(cache=True)
-def alike(body: Any, name: Any) -> float:
-    """Log likelihood of how the body looked and walked of late, were it who is called like ``name``."""
+def alike(body: Any, name: Any, scattered: Array) -> float:
+    """Log likelihood of how the body looked and walked of late, were it who is called like ``name``.
+
+    ``scattered`` (3,) is what `shine.scatter` has learned.
+    """
     value = 0.0
     if body.look_n > 0 and name.own_n >= _SEEN:
-        variance = _LOOKS**2 + _PATCHES**2 / body.look_n
+        variance = scattered[1] + scattered[0] * _PATCHES**2 / body.look_n
         value -= 0.5 * min((body.look - name.own) ** 2 / variance, _FAR**2)
     if body.pace_n > 0 and name.own_pace_n >= _WALKED:
         stance = _PACE if body.shoe >= SHOES else _PACE_OF_LEGS
@@ -47,13 +50,13 @@ def alike(body: Any, name: Any) -> float:
 
 
 @njit(cache=True)
-def _posterior(bodies: Any, b: int, belief: Array, out: Array) -> None:
+def _posterior(bodies: Any, b: int, belief: Array, scattered: Array, out: Array) -> None:
     """Fill ``out`` (n,): how likely body b is who has each name, with what was seen since the last doubt."""
     total = 0.0
     for k in range(bodies.size):
         out[k] = 0.0
         if belief[b, k] > 0.0 and bodies[k].used and bodies[k].confirmed:
-            out[k] = belief[b, k] * np.exp(alike(bodies[b], bodies[k]))
+            out[k] = belief[b, k] * np.exp(alike(bodies[b], bodies[k], scattered))
             total += out[k]
     if total > 0.0:
         out /= total
@@ -63,7 +66,14 @@ def _posterior(bodies: Any, b: int, belief: Array, out: Array) -> None:
 
 @njit(cache=True)
 def unite(
-    bodies: Any, belief: Array, others: Any, others_belief: Array, of: NDArray[np.int64], worse: float, spare: Array
+    bodies: Any,
+    belief: Array,
+    others: Any,
+    others_belief: Array,
+    of: NDArray[np.int64],
+    worse: float,
+    scattered: Array,
+    spare: Array,
 ) -> None:
     """``others``, at the same places but with body ``of`` (n,) for each of ``bodies``, is ``worse`` (log likelihood).
 
@@ -82,8 +92,8 @@ def unite(
     for b in range(bodies.size):
         if of[b] < 0 or of[b] == b:
             continue
-        _posterior(bodies, b, belief, spare[0])
-        _posterior(others, of[b], others_belief, spare[1])
+        _posterior(bodies, b, belief, scattered, spare[0])
+        _posterior(others, of[b], others_belief, scattered, spare[1])
         for k in range(bodies.size):
             mixed[b, k] = (1.0 - share) * spare[0, k] + share * spare[1, k]
     for b in range(bodies.size):
@@ -111,7 +121,7 @@ def christen(bodies: Any, belief: Array, index: int, x: float, y: float) -> None
 
 
 @njit(cache=True)
-def renamed(bodies: Any, belief: Array, t: float, names: NDArray[np.int64]) -> bool:
+def renamed(bodies: Any, belief: Array, t: float, scattered: Array, names: NDArray[np.int64]) -> bool:
     """Fill ``names`` (n,) with whose name each body should have; whether any changes. Notes how sure names are."""
     n = 0
     rows = np.empty(bodies.size, np.int64)
@@ -128,7 +138,7 @@ def renamed(bodies: Any, belief: Array, t: float, names: NDArray[np.int64]) -> b
         total = 0.0
         for j in range(n):
             b, k = rows[i], rows[j]
-            cost[i, j] = -np.log(max(belief[b, k], _UNNOTICED)) - alike(bodies[b], bodies[k])
+            cost[i, j] = -np.log(max(belief[b, k], _UNNOTICED)) - alike(bodies[b], bodies[k], scattered)
             total += np.exp(-cost[i, j])
         bodies[rows[i]].sure = np.exp(-cost[i, i]) / total
     best = np.empty(n, np.int64)

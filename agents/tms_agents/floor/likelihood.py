@@ -21,6 +21,8 @@ _ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
 _FRESH_S = 1.0
 #: Two feet side by side are hardly wider (m).
 _BROAD_M = 0.45
+#: What is seen of a robot is so near its edge (m), if it was seen so long ago (s) at most.
+_BESIDE_M, _STAYS_S = 0.2, 2.0
 #: Negative log likelihood: of a foot seen just now being somewhere else, of having landed where something stood
 #: before, of swinging while the other foot swings.
 _SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
@@ -120,14 +122,16 @@ def costs(
             if away > _REACH_M + 1.5 * np.sqrt(body.pp):
                 continue
             if body.robot or body.wide > 0.6:
-                if away > 1.0:
+                # One that is seen does not jump to another that stands beside it.
+                jumps = body.machine and t - body.seen < _STAYS_S
+                if away > (0.5 * body.far + _BESIDE_M if jumps else _ROBOT_M):
                     continue
                 # Part of it may be hidden, but what is narrow and all in view is somebody's foot.
                 cost[i, 2 * column] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > 0.6 * body.width else 6.0)
                 continue
             speed = np.hypot(body.vx, body.vy)
             base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
-            shape = unlike(body, marks[i, 0], marks[i, 1])
+            shape = unlike(body, marks[i])
             if c.width > WIDE_M:
                 shape += 3.0
                 if c.width > _BROAD_M and body.hits > 15:

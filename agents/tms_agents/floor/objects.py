@@ -31,11 +31,19 @@ _TRUST_M = 0.04
 _SPARE_S = 2.0
 #: One beam is believed after so many hits; what has never been seen whole after so long (s).
 _SINGLE, _PART_S = 10, 4.0
+#: So little is seen of what is hidden in part that it is believed after so long (s).
+_SLIVER_S = 12.0
 #: What is black or glossy is believed where so many scans saw nothing behind it; of all more than this share hit it.
 _MUTES, _SELDOM = 10, 0.06
 #: Somebody lost sight of so near (m) may still stand there for so long (s), on two feet so near each other (m) that are
 #: seen again at the same time (within s).
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
+#: No foot looks narrower (m).
+_FOOT_M = 0.06
+#: Robots stand for so long (s); what stands behind something is seen in part in this share of its sightings.
+_PARKS_S, _COVERED = 60.0, 0.8
+#: A robot that was here so long ago (s) may still be.
+_ROBOTS_S = 120.0
 #: Nobody stands with the feet so far apart (m) for so long (s).
 _ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
 #: Surfaces lie this uncertain behind what is seen (m²).
@@ -94,21 +102,28 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
 
 
 @njit(cache=True)
-def _somebodys(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
-    """Whether the print j may be a foot of somebody who was lost there: hidden in part, or there are two."""
+def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float) -> bool:
+    """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, or there are two.
+
+    Where there are ``robots``, what stands behind something new, and is never seen whole, may be a part of one.
+    """
+    if robots and q.covered > _COVERED * q.hits and t - q.first < _PARKS_S:
+        return True
+    if t - q.first > _STANDS_S or q.given:
+        return False
     lost = False
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
             lost = True
-    if not lost or t - q.first > _STANDS_S:
-        return False
-    if q.whole < 0.5 * q.hits:
+    if lost and q.whole < 0.5 * q.hits:
         return True
+    if q.width < _FOOT_M:
+        return False
     for o in range(prints.size):
         p = prints[o]
         other = o != j and p.used and p.owner < 0 and t - p.last < 0.5 and abs(p.first - q.first) < _TOGETHER_S
-        if other and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
+        if other and p.width > _FOOT_M and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
             return True
     return False
 
@@ -132,7 +147,8 @@ def _plain(q: Any, t: float, rest_s: float) -> bool:
     # What is silent most of the time shows less of itself.
     seldom = t - q.silent < 1.0 and q.mutes >= _MUTES and q.hits > _SELDOM * (q.looks + q.mutes)
     quiet = seldom or (t - q.silent < 1.0 and q.hits >= 6)
-    if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet:
+    hidden = q.whole == 0 and q.beams >= 2.0 and age > _SLIVER_S
+    if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet and not hidden:
         return False
     if q.beams < 1.5 and not seldom and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks or q.hits < _SINGLE):
         return False
@@ -160,7 +176,14 @@ def _third(q: Any, bodies: Any, t: float, rest_s: float) -> bool:
 
 @njit(cache=True)
 def _ripe(
-    prints: Any, bodies: Any, t: float, rest_s: float, alone_s: float, width_m: float, ripe: NDArray[np.int64]
+    prints: Any,
+    bodies: Any,
+    robots: bool,
+    t: float,
+    rest_s: float,
+    alone_s: float,
+    width_m: float,
+    ripe: NDArray[np.int64],
 ) -> int:
     """Prints that are an `OBJECT` or `FURNITURE` by now, into ``ripe``; how many."""
     count = 0
@@ -188,7 +211,7 @@ def _ripe(
         nobodys = alone or given or astride or q.spare >= _SPARE_S
         if not nobodys and (t - q.owned < alone_s or not _third(q, bodies, t, rest_s)):
             continue
-        if _somebodys(q, prints, j, bodies, t):
+        if _somebodys(q, prints, j, bodies, robots, t):
             continue
         if q.width < width_m:
             ripe[j] = OBJECT
@@ -207,6 +230,8 @@ class Objects:
         self._settings = settings
         #: For each object not seen now: label of a mover -> how near (m) it has been since the object was last seen.
         self.visitors: dict[int, dict[int, float]] = {}
+        #: When there was a robot.
+        self.robot_at = -math.inf
         self._ripe = np.zeros(0, np.int64)
 
     def weigh(self, looks: Any, bodies: Any, t: float, dt: float) -> list[FloorEvent]:
@@ -226,10 +251,14 @@ class Objects:
 
     def ripe(self, prints: Any, bodies: Any, t: float) -> list[tuple[int, int]]:
         """Prints that rest, and what each is: `OBJECT` or `FURNITURE`."""
+        if (bodies["used"] & bodies["machine"]).any():
+            self.robot_at = t
         s = self._settings
         if self._ripe.size != prints.size:
             self._ripe = np.zeros(prints.size, np.int64)
-        if not _ripe(prints, bodies, t, s.rest_s, s.alone_s, s.object_width_m, self._ripe):
+        if not _ripe(
+            prints, bodies, t - self.robot_at < _ROBOTS_S, t, s.rest_s, s.alone_s, s.object_width_m, self._ripe
+        ):
             return []
         return [(j, int(self._ripe[j])) for j in np.flatnonzero(self._ripe).tolist()]
 
@@ -271,18 +300,23 @@ class Objects:
 
     def _attend(self, bodies: Any, t: float) -> None:
         """Remember who came near an object while it was not seen: that is who may have taken it."""
-        used = self.things["used"] == 1
-        for index in np.flatnonzero(used).tolist():
-            thing = self.things[index]
-            label = int(thing["label"])
-            if thing["seen"] == t:
+        used = np.flatnonzero(self.things["used"] == 1)
+        present = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1))
+        dx = np.subtract.outer(self.things["x"][used], bodies["x"][present])
+        dy = np.subtract.outer(self.things["y"][used], bodies["y"][present])
+        away = np.hypot(dx, dy)
+        movers = bodies["label"][present].tolist()
+        rows = zip(self.things["label"][used].tolist(), self.things["seen"][used].tolist(), away.tolist(), strict=True)
+        for label, seen, gaps in rows:
+            near = [(gap, mover) for gap, mover in zip(gaps, movers, strict=True) if gap < _FAR_M]
+            if seen == t:
                 # Whoever was near when it was last seen: kept from this scan on.
                 self.visitors.pop(label, None)
-                if not _any_near(bodies, thing["x"], thing["y"]):
+                if not near:
                     continue
             visitors = self.visitors.setdefault(label, {})
-            for near, mover in near_movers(bodies, float(thing["x"]), float(thing["y"])):
-                visitors[mover] = min(near, visitors.get(mover, math.inf))
+            for gap, mover in near:
+                visitors[mover] = min(gap, visitors.get(mover, math.inf))
 
 
 def near_movers(bodies: Any, x: float, y: float) -> list[tuple[float, int]]:
@@ -290,10 +324,6 @@ def near_movers(bodies: Any, x: float, y: float) -> list[tuple[float, int]]:
     present = (bodies["used"] == 1) & (bodies["confirmed"] == 1)
     away = np.hypot(bodies["x"] - x, bodies["y"] - y)
     return [(float(away[b]), int(bodies["label"][b])) for b in np.flatnonzero(present & (away < _FAR_M)).tolist()]
-
-
-def _any_near(bodies: Any, x: float, y: float) -> bool:
-    return bool(near_movers(bodies, x, y))
 
 
 def _candidates(visitors: dict[int, float]) -> Candidates:

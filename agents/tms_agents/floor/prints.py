@@ -80,7 +80,7 @@ def follow(
             of[k] = j
             taken[j] = True
             q = prints[j]
-            q.used, q.first, q.hits, q.looks, q.mutes, q.whole = 1, t, 0, 0, 0, 0
+            q.used, q.first, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, 0, 0, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
@@ -89,15 +89,16 @@ def follow(
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
-            q.first, q.hits, q.looks, q.mutes, q.whole, q.spread = t, 0, 0, 0, 0, 0.0
+            q.first, q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = t, 0, 0, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
             q.revealed = 0
         if t - max(q.last, q.silent) > _GONE_S:
             # Somebody else may stand there now.
-            q.first, q.hits, q.looks, q.mutes, q.whole, q.spread = t, 0, 0, 0, 0, 0.0
+            q.first, q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = t, 0, 0, 0, 0, 0, 0.0
         q.hits += 1
         q.looks += 1
         q.last = t
+        q.covered += c.cut == 2
         q.attached += 0.15 * (c.attached - q.attached)
         q.sensor, q.first_beam, q.last_beam = sensor, c.first, c.last
         # What is black or glossy is hardly ever seen whole: all that is seen of it counts.

@@ -14,27 +14,43 @@ Array = NDArray[np.float64]
 
 #: The light that comes back falls with the range by this power (Kyushu University, `irvs/ros_tms`, tms_ss_fss).
 _FALL = 0.287
-#: Standard deviations of the logarithm: sides and seams of one shoe, one beam, and people in general.
+#: Standard deviations of the logarithm: sides and seams of one shoe, one beam, and people in general; at first.
 _PATCHES, _BEAM, _PEOPLE = 0.12, 0.15, 0.4
 #: What is known of somebody never counts as better than this many sightings; the least that tell anything.
 _MEMORY, _LEAST = 40, 4
 #: So many sightings make somebody's own look.
 _LIFE = 1200
-#: Scans of one foot resemble each other: each tells so much only, and nothing tells more than so many deviations.
-_SHARE, _FAR = 0.5, 3.5
+#: Scans of one foot resemble each other: each tells so much only, more where shoes are even, since what is left then
+#: is the noise of beams, new in every scan; and nothing tells more than so many deviations.
+_SHARE, _EVEN, _FAR = 0.5, 0.35, 3.5
+#: Standard deviation of somebody's look as he turns, at first; what was expected counts like so many sightings, and
+#: never more than so many are remembered; nothing is known better than this (share of what was expected, deviation).
+_TURNS, _PRIOR, _LONG = 0.08, 40.0, 3000.0
+_BEST, _STEADY = 0.1, 0.03
+#: Whose shoes were seen so often has a look; somebody else so near (m) may be mistaken for him.
+_KNOWN, _ALONE_M = 120, 0.8
+
+
+def expected() -> Array:
+    """How brightness scatters before anybody was seen, as `scatter` learns it."""
+    return np.array([1.0, _TURNS**2, _PRIOR])
 
 
 @njit(cache=True)
-def measure(clusters: Any, ranges: Array, intensities: Array, increment_s: float, marks: Array) -> None:
-    """Fill ``marks`` (m, 3): logarithm of the brightness of each cluster at one metre (NaN: unknown), its variance, and
-    when it was seen, s into the sweep.
+def measure(
+    clusters: Any, ranges: Array, intensities: Array, increment_s: float, scattered: Array, marks: Array
+) -> None:
+    """Fill ``marks`` (m, 4): logarithm of the brightness of each cluster at one metre (NaN: unknown), its variance,
+    when it was seen, s into the sweep, and how much one scan tells.
 
     ``intensities`` (n,) in any unit that grows in proportion to the light; empty where the sensor gives none.
+    ``scattered`` (3,) is what `scatter` has learned.
     """
     for k in range(clusters.size):
         c = clusters[k]
         marks[k, 0], marks[k, 1] = np.nan, 1.0
         marks[k, 2] = 0.5 * increment_s * (c.first + c.last)
+        marks[k, 3] = _SHARE + _EVEN * max(1.0 - scattered[0], 0.0)
         if intensities.size == 0:
             continue
         total, best, count = 0.0, -np.inf, 0
@@ -47,17 +63,18 @@ def measure(clusters: Any, ranges: Array, intensities: Array, increment_s: float
                 count += 1
         if count > 0:
             marks[k, 0] = total / count
-            marks[k, 1] = _PATCHES**2 + _BEAM**2 / count
+            marks[k, 1] = scattered[0] * (_PATCHES**2 + _BEAM**2 / count)
 
 
 @njit(cache=True)
-def unlike(body: Any, value: float, variance: float) -> float:
-    """Negative log likelihood ratio, of one scan, of this brightness (mean, variance) at this body or at anybody."""
+def unlike(body: Any, mark: Array) -> float:
+    """Negative log likelihood ratio, of one scan, of a brightness (`measure`, (4,)) at this body or at anybody."""
+    value, variance = mark[0], mark[1]
     if np.isnan(value) or body.shine_n < _LEAST:
         return 0.0
-    variance += _PATCHES**2 / body.shine_n
+    variance *= 1.0 + 1.0 / body.shine_n
     off = min((value - body.shine) ** 2 / variance, _FAR**2)
-    return float(_SHARE * (0.5 * off + 0.5 * np.log(variance / (_PEOPLE**2 + variance))))
+    return float(mark[3] * (0.5 * off + 0.5 * np.log(variance / (_PEOPLE**2 + variance))))
 
 
 @njit(cache=True)
@@ -72,3 +89,36 @@ def learn(body: Any, value: float, variance: float) -> None:
     if body.sure >= SURE:
         body.own_n = min(body.own_n + 1, _LIFE)
         body.own += (value - body.own) / body.own_n
+
+
+@njit(cache=True)
+def scatter(bodies: Any, clusters: Any, of: NDArray[np.int64], marks: Array, t: float, scattered: Array) -> None:
+    """Learn from those whom nobody is beside how much brightness scatters from sighting to sighting and as they turn.
+
+    ``scattered`` (3,): the variance of a sighting, in units of what is expected, of a look, and how much is known.
+    """
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not body.used or not body.confirmed or body.robot or body.seen < t or body.shine_n < _MEMORY:
+            continue
+        alone = body.sure >= SURE
+        for o in range(bodies.size):
+            other = bodies[o]
+            near = o != b and other.used and np.hypot(other.x - body.x, other.y - body.y) < _ALONE_M
+            alone = alone and not near
+        if not alone:
+            continue
+        for i in range(clusters.size):
+            mine = of[i] >= 0 and (body.a_print == of[i] or body.b_print == of[i])
+            if not mine or clusters[i].cut or np.isnan(marks[i, 0]):
+                continue
+            expected_variance = marks[i, 1] / scattered[0]
+            off = (marks[i, 0] - body.shine) ** 2 / expected_variance
+            gain = 1.0 / scattered[2]
+            scattered[0] += gain * (min(off, _FAR**2 * scattered[0]) - scattered[0])
+            scattered[0] = max(scattered[0], _BEST)
+            if body.own_n >= _KNOWN:
+                off = (body.shine - body.own) ** 2
+                scattered[1] += gain * (min(off, _FAR**2 * scattered[1]) - scattered[1])
+                scattered[1] = max(scattered[1], _STEADY**2)
+            scattered[2] = min(scattered[2] + 1.0, _LONG)

@@ -9,7 +9,8 @@ import numpy as np
 
 #: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
 #: (x, y) m mean of where it was seen, first and last time seen, hits, looks and mutes (scans
-#: since that hit it, that could have, that saw nothing at all there), width m, spread m (mean
+#: since that hit it, that could have, that saw nothing at all there; of those that hit it, that saw all of it, and only
+#: what something new before it left), width m, spread m (mean
 #: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), freed (when a body was last
 #: near), touched (label of the last owner), spare (s for which somebody beside it has shown two other feet), beams of
 #: the last sighting.
@@ -24,6 +25,7 @@ PRINT = np.dtype(
         ("looks", "i8"),
         ("mutes", "i8"),
         ("whole", "i8"),
+        ("covered", "i8"),
         ("width", "f8"),
         ("spread", "f8"),
         ("beams", "f8"),

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
+#: Where the other foot was last seen, within this (m), and it may be hidden, time counts by this share.
+_BEHIND, _STEP_M = 0.2, 0.1
 #: Nobody stands for so long (s) without shifting a foot.
 _STILL_S = 40.0
 #: What was pushed stands still for so long (s): it is furniture.
@@ -146,7 +148,13 @@ def _review(
                 actions[b] = _CONFIRM
             continue
         if unseen == 0.0:
-            body.lone = body.lone + dt if _is_lone(body, t) else 0.0
+            if not _is_lone(body, t):
+                body.lone = 0.0
+            else:
+                unseen_b = body.a_seen >= body.b_seen
+                x, y, at = (body.bx, body.by, body.b_seen) if unseen_b else (body.ax, body.ay, body.a_seen)
+                behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
+                body.lone += dt * (_BEHIND if behind else 1.0)
             single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
             body.single = body.single + dt if single else 0.0
             if body.lone > _LONE_S or misled(body):
@@ -339,7 +347,7 @@ class Tracks:
             body["from_furniture"] = -1
         old = self._missing(body)
         if old is None:
-            old = self.absent.find(body)
+            old = self.absent.find(body, self._association.scattered)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
             for field in ("own", "own_n", "own_pace", "own_pace_n"):

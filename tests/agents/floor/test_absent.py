@@ -9,6 +9,7 @@ import pytest
 from tms_agents.floor.absent import Absent
 from tms_agents.floor.events import Vanished
 from tms_agents.floor.masks import Area
+from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, empty
 
 DOOR = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
@@ -30,8 +31,8 @@ def absent() -> Absent:
 
 def test_who_turns_up_again_has_his_name(absent: Absent) -> None:
     assert absent.keep(person(4.0, 4.0, label=3))
-    assert absent.find(person(5.0, 4.0, first=12.0))["label"] == 3
-    assert absent.find(person(5.0, 4.0, first=12.0)) is None
+    assert absent.find(person(5.0, 4.0, first=12.0), expected())["label"] == 3
+    assert absent.find(person(5.0, 4.0, first=12.0), expected()) is None
 
 
 def test_who_is_lost_at_the_door_has_left(absent: Absent) -> None:
@@ -40,7 +41,7 @@ def test_who_is_lost_at_the_door_has_left(absent: Absent) -> None:
 
 def test_who_comes_in_at_the_door_is_somebody_new(absent: Absent) -> None:
     absent.keep(person(2.0, 0.0))
-    assert absent.find(person(0.8, 0.0, first=12.0)) is None
+    assert absent.find(person(0.8, 0.0, first=12.0), expected()) is None
 
 
 def test_without_doors_people_may_leave_anywhere() -> None:
@@ -55,15 +56,15 @@ def test_a_glimpse_is_nobody(absent: Absent) -> None:
 
 def test_who_is_too_far_away_or_looks_otherwise_is_somebody_else(absent: Absent) -> None:
     absent.keep(person(4.0, 4.0))
-    assert absent.find(person(9.0, 4.0, first=11.0)) is None
-    assert absent.find(person(4.5, 4.0, first=11.0, own=6.0)) is None
-    assert absent.find(person(4.5, 4.0, first=11.0)) is not None
+    assert absent.find(person(9.0, 4.0, first=11.0), expected()) is None
+    assert absent.find(person(4.5, 4.0, first=11.0, own=6.0), expected()) is None
+    assert absent.find(person(4.5, 4.0, first=11.0), expected()) is not None
 
 
 def test_of_two_the_one_who_looks_like_it(absent: Absent) -> None:
     absent.keep(person(4.0, 4.0, label=1, own=7.3))
     absent.keep(person(4.2, 4.0, label=2, own=7.1))
-    assert absent.find(person(4.0, 4.0, first=11.0, own=7.1))["label"] == 2
+    assert absent.find(person(4.0, 4.0, first=11.0, own=7.1), expected())["label"] == 2
 
 
 def test_who_does_not_turn_up_has_left(absent: Absent) -> None:
@@ -78,7 +79,7 @@ def test_who_is_waited_for_is_so_after_a_restart(absent: Absent) -> None:
     absent.keep(person(7.0, 4.0, label=6))
     again = Absent(Area([DOOR]))
     again.restore(json.loads(json.dumps(absent.save())))
-    assert again.find(person(4.5, 4.0, first=12.0))["label"] == 5
+    assert again.find(person(4.5, 4.0, first=12.0), expected())["label"] == 5
     assert again.gone(31.0) == [Vanished(31.0, 6, 10.0, 31.0)]
 
 

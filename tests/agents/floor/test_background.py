@@ -97,3 +97,11 @@ def test_what_has_gone_comes_back_whole_and_anything_less_is_something_new() -> 
     hidden = cupboard.copy()
     hidden[14:25] = 1.0
     assert (background.classify(hidden)[10:14] == BACKGROUND).all()
+
+
+def test_something_new_is_not_learned_within_seconds_though_the_room_is_hardly_known(learned: Background) -> None:
+    learn(learned, np.full(30, 3.0), 12.0)
+    scan = np.full(30, 3.0)
+    scan[12:16] = 2.9
+    learn(learned, scan, 5.0)
+    assert learned.classify(scan)[13] == FOREGROUND

@@ -129,3 +129,33 @@ def test_a_trolley_that_was_pushed_is_nobody_when_it_stands() -> None:
     movers = [one for one in estimator.labels() if one.kind == "mover"]
     assert not [one for one in movers if math.hypot(one.xy[0] - 3.6, one.xy[1] - 2.4) < 0.5]
     assert len(born(events, "object")) <= 1
+
+
+def legs(*places: tuple[float, float], since: float):
+    """Legs that stand there."""
+    return lambda t: [(x, y, 0.05) for x, y in places] if t >= since else []
+
+
+def test_two_legs_that_stand_there_all_at_once_are_somebody_and_no_things() -> None:
+    _, events = Room(legs((2.5, 2.0), (2.3, 2.15), since=9.0)).play(30.0)
+    assert not born(events, "object")
+
+
+def test_who_stands_with_one_leg_behind_the_other_is_still_there() -> None:
+    """The room's laser looks from the corner: the second leg steps right behind the first."""
+
+    def second(t: float) -> list[tuple[float, float, float]]:
+        share = min(max((t - 14.0) / 0.5, 0.0), 1.0)
+        return [(2.1 + 0.25 * share, 2.42 - 0.07 * share, 0.05)] if t >= 12.0 else []
+
+    way = [(9.0, 4.9, 2.2), (12.0, 2.2, 2.2)]
+    _, events = Room(together(walker(way), legs((2.15, 2.15), since=12.0), second)).play(24.0)
+    assert not born(events, "object")
+
+
+def test_a_thing_beside_a_leg_of_a_table_that_hides_a_part_of_it_for_ever_is_found() -> None:
+    post = box(1.5, 1.42, 0.04, 0.04)
+    room = Room(together(walker(AT_THE_WALL), thing(2.5, 2.5, 0.06, 13.0)), lambda t: (*WALLS, *post))
+    _, events = room.play(40.0)
+    (put,) = born(events, "object")
+    assert math.hypot(put.xy[0] - 2.5, put.xy[1] - 2.5) < 0.06

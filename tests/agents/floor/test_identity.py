@@ -7,7 +7,7 @@ import pytest
 
 from tms_agents.floor.gait import beat
 from tms_agents.floor.identity import alike, christen, renamed, unite
-from tms_agents.floor.shine import learn
+from tms_agents.floor.shine import expected, learn
 from tms_agents.floor.state import BODY, empty
 
 VARIANCE = 0.01
@@ -36,12 +36,12 @@ def meet(bodies, belief, worse: float) -> None:
     """The first two meet; that they went on the other way round is ``worse``."""
     of = np.arange(len(bodies))
     of[:2] = 1, 0
-    unite(bodies, belief, bodies.copy(), belief.copy(), of, worse, np.empty((2, len(bodies))))
+    unite(bodies, belief, bodies.copy(), belief.copy(), of, worse, expected(), np.empty((2, len(bodies))))
 
 
 def names(bodies, belief) -> list[int]:
     found = np.zeros(len(bodies), np.int64)
-    renamed(bodies, belief, 1.0, found)
+    renamed(bodies, belief, 1.0, expected(), found)
     return found.tolist()
 
 
@@ -94,5 +94,5 @@ def test_who_is_found_again_may_be_one_of_those_beside() -> None:
 def test_who_is_not_known_yet_is_like_anybody() -> None:
     bodies, _ = people((7.4, 0.6), (6.9, 0.7))
     bodies["own_n"][1] = bodies["own_pace_n"][1] = 0
-    assert alike(bodies[0], bodies[1]) == 0.0
-    assert alike(bodies[1], bodies[0]) < -2.0
+    assert alike(bodies[0], bodies[1], expected()) == 0.0
+    assert alike(bodies[1], bodies[0], expected()) < -2.0
