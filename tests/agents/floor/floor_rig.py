@@ -144,7 +144,7 @@ class Rig:
         found = await asyncio.to_thread(self.town.labels, self.name)
         return {one.label: one for one in found.labels if one.kind == kind and not one.ghost}
 
-    async def state(self, state: str, why: str = "", timeout_s: float = 20.0) -> AgentView:
+    async def state(self, state: str, why: str = "", timeout_s: float = 60.0) -> AgentView:
         """Wait until the server shows this state, with this in its reason."""
         view = await self.view()
         try:
@@ -156,7 +156,7 @@ class Rig:
             raise AssertionError(f"not {state} ({why}) within {timeout_s} s, but {view.state}: {view.why}") from None
         return view
 
-    async def count(self, wanted: int, kind: str = "floor", timeout_s: float = 20.0) -> dict[str, Any]:
+    async def count(self, wanted: int, kind: str = "floor", timeout_s: float = 60.0) -> dict[str, Any]:
         """Wait until the server has so many labels of a kind."""
         found = await self.labels(kind)
         try:
