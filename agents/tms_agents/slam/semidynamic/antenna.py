@@ -12,7 +12,7 @@ from tms_agents.slam.geometry import Floats, between
 from tms_agents.slam.semidynamic.models import Antenna
 
 #: Reads inside the lobe, and outside; how blurred its edge is (share of the range).
-_INSIDE, _OUTSIDE, _EDGE = 0.7, 0.004, 0.08
+_INSIDE, _OUTSIDE, _EDGE = 0.7, 0.004, 0.15
 #: A tag that is turned away is read at most at this share of the range.
 _BEHIND = 0.12
 #: Reads from about the same place are no independent witnesses.
@@ -29,7 +29,7 @@ def detection(antenna: Antenna, tags: Floats) -> Floats:
     ahead = np.maximum(np.cos(bearing), 1e-3) ** exponent
     turned = np.maximum(np.cos(facing), 0.0)
     reach = antenna.reach * np.sqrt(ahead) * np.maximum(turned**0.35, _BEHIND)
-    inside = 1.0 / (1.0 + np.exp((distance - 0.95 * reach) / (_EDGE * antenna.reach)))
+    inside = 1.0 / (1.0 + np.exp((distance - 1.05 * reach) / (_EDGE * antenna.reach)))
     found: Floats = _OUTSIDE + (_INSIDE - _OUTSIDE) * inside
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tms_agents.slam.geometry import Floats, compose, inverse, wrapped
 from tms_agents.slam.semidynamic.evidence import CELL_M
@@ -10,9 +11,12 @@ from tms_agents.slam.semidynamic.models import ObjectModel
 from tms_agents.slam.semidynamic.scoring import Sight
 from tms_agents.slam.semidynamic.shapes import Shape
 
-_FROM_READS, _FROM_SURFACES = 2000, 4000
+_FROM_READS, _FROM_SURFACES = 2000, 8000
+#: Cells that may be the object's (log-odds), the share that those count which are always occupied, how far away they
+#: may be (reaches of the antenna).
+_PROMISING, _WALLS, _REACHES = 0.1, 0.2, 1.3
 #: So many of the best are refined, by steps (m, rad) that are halved so often.
-_REFINED, _STEPS, _HALVED = 60, (0.06, 0.12), 4
+_REFINED, _STEPS, _HALVED = 100, (0.06, 0.12), 4
 #: Poses nearer to each other (m, rad) are one.
 _SAME_M, _SAME_RAD = 0.06, 0.15
 
@@ -59,11 +63,16 @@ def _from_reads(sight: Sight, model: ObjectModel, random: np.random.Generator) -
 
 def _from_surfaces(sight: Sight, model: ObjectModel, shape: Shape, random: np.random.Generator) -> Floats:
     """A point of the outline at a cell where beams ended that do not always end there, turned as the reads have it."""
-    promising = np.argwhere(sight.cells.seen + sight.cells.always > 0.15)
-    if not len(promising):
-        return np.empty((0, 3))
+    # What is not always there is the more telling; far from where the tag was read nothing is.
     seen_from = _readers(sight)
-    cells = promising[random.integers(len(promising), size=_FROM_SURFACES)]
+    reach = max(one.antenna.reach for one in sight.heard) + shape.size
+    cells = np.argwhere(sight.cells.seen + sight.cells.always > _PROMISING)
+    apart, _ = cKDTree(seen_from[:, :2]).query(sight.place.corner + (cells[:, ::-1] + 0.5) * CELL_M)
+    cells = cells[apart < _REACHES * reach]
+    if not len(cells):
+        return np.empty((0, 3))
+    telling = sight.cells.seen[cells[:, 0], cells[:, 1]] + _WALLS * sight.cells.always[cells[:, 0], cells[:, 1]]
+    cells = cells[random.choice(len(cells), size=_FROM_SURFACES, p=telling / telling.sum())]
     at = sight.place.corner + (cells[:, ::-1] + 0.5) * CELL_M
     points = shape.outline[random.integers(len(shape.outline), size=_FROM_SURFACES)]
     antenna = seen_from[random.integers(len(seen_from), size=_FROM_SURFACES)]

@@ -20,7 +20,7 @@ _SHARED_M, _SHARED = 0.05, 0.5
 #: Poses nearer to each other (m, rad) are the same.
 SAME_M, SAME_RAD = 0.08, 0.2
 #: At most so many times all anew; scores so near are the same.
-_SWEEPS, _SAME_SCORE = 4, 1e-6
+_STARTS, _SWEEPS, _SAME_SCORE = 6, 4, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,23 +41,35 @@ class Track:
     families: Sequence[Family]
     chosen: Floats | None = None
     total: float = 0.0
-    _trees: dict[bytes, cKDTree] = field(default_factory=dict)
+    #: By the array of poses, the other tag and its pose: what they share.
+    overlaps: dict[tuple[int, str, bytes], Floats] = field(default_factory=dict)
 
     def outline(self, pose: Floats) -> Floats:
         return transform(pose, self.shape.outline)
 
-    def tree(self, pose: Floats) -> cKDTree:
-        key = pose.tobytes()
-        if key not in self._trees:
-            self._trees[key] = cKDTree(self.outline(pose))
-        return self._trees[key]
 
-
-def choose(tracks: Mapping[str, Track]) -> None:
-    """Sets ``chosen`` of every track: the best by itself first, then pairs anew in both orders while that is better."""
+def choose(tracks: Mapping[str, Track], random: np.random.Generator) -> None:
+    """Sets ``chosen`` of every track. Begun from several orders, the best by themselves first at the first time: things
+    that look alike may stand in each other's places, which takes more than one step to put right."""
     at_once = _at_once(tracks)
-    for tag in sorted(tracks, key=lambda tag: (-_best_alone(tracks[tag]), tag)):
-        _solve(tracks[tag], tracks, at_once)
+    tags = sorted(tracks, key=lambda tag: (-_best_alone(tracks[tag]), tag))
+    best, found = -np.inf, {}
+    for _ in range(_STARTS):
+        for track in tracks.values():
+            track.chosen = None
+        for tag in tags:
+            _solve(tracks[tag], tracks, at_once)
+        _improve(tracks, at_once)
+        total = _total(tracks, at_once)
+        if total > best + _SAME_SCORE:
+            best, found = total, {tag: track.chosen for tag, track in tracks.items()}
+        tags = [tags[n] for n in random.permutation(len(tags))]
+    for tag, track in tracks.items():
+        track.chosen = found[tag]
+
+
+def _improve(tracks: Mapping[str, Track], at_once: _Shared) -> None:
+    """One by one, then pairs in both orders, while that is better."""
     for _ in range(_SWEEPS):
         changed = False
         for tag in sorted(tracks):
@@ -69,6 +81,15 @@ def choose(tracks: Mapping[str, Track]) -> None:
                 changed |= _again(tracks[a], tracks[b], tracks, at_once)
         if not changed:
             break
+
+
+def _total(tracks: Mapping[str, Track], at_once: _Shared) -> float:
+    """Of all as chosen; what several share counts once."""
+    total, left = 0.0, set(tracks)
+    for tag in sorted(tracks):
+        left.discard(tag)
+        total += _viterbi(tracks[tag], tracks, at_once, fixed=tracks[tag].chosen, without=frozenset(left))[1]
+    return total
 
 
 _Shared = Mapping[str, Sequence[tuple[int, str, int]]]
@@ -107,7 +128,7 @@ def _again(a: Track, b: Track, tracks: Mapping[str, Track], at_once: _Shared) ->
 
 def _joint(a: Track, b: Track, tracks: Mapping[str, Track], at_once: _Shared) -> float:
     """Of two tracks as chosen; what they share counts once."""
-    _, alone = _viterbi(a, tracks, at_once, fixed=a.chosen, without=b.tag)
+    _, alone = _viterbi(a, tracks, at_once, fixed=a.chosen, without=frozenset({b.tag}))
     _, other = _viterbi(b, tracks, at_once, fixed=b.chosen)
     return alone + other
 
@@ -117,7 +138,12 @@ def _solve(track: Track, tracks: Mapping[str, Track], at_once: _Shared) -> None:
 
 
 def _viterbi(
-    track: Track, tracks: Mapping[str, Track], at_once: _Shared, *, fixed: Floats | None = None, without: str = ""
+    track: Track,
+    tracks: Mapping[str, Track],
+    at_once: _Shared,
+    *,
+    fixed: Floats | None = None,
+    without: frozenset[str] = frozenset(),
 ) -> tuple[Floats, float]:
     best, found = -np.inf, np.empty((0, 3))
     for family in track.families:
@@ -155,17 +181,27 @@ def _stays(track: Track, number: int, family: Family) -> Floats:
 
 
 def _shared(
-    track: Track, number: int, poses: Floats, tracks: Mapping[str, Track], at_once: _Shared, without: str
+    track: Track, number: int, poses: Floats, tracks: Mapping[str, Track], at_once: _Shared, without: frozenset[str]
 ) -> Floats:
     """(C,) what other objects at the same time already explain."""
     total: Floats = np.zeros(len(poses))
     for mine, tag, theirs in at_once[track.tag]:
         chosen = tracks[tag].chosen
-        if mine != number or chosen is None or tag == without:
+        if mine != number or chosen is None or tag in without:
             continue
-        tree = tracks[tag].tree(chosen[theirs])
-        near = np.hypot(*(poses[:, :2] - chosen[theirs, :2]).T) < track.shape.size + tracks[tag].shape.size
+        total += _overlap(track, poses, tracks[tag], chosen[theirs])
+    return total
+
+
+def _overlap(track: Track, poses: Floats, other: Track, pose: Floats) -> Floats:
+    """(C,) what an object at ``poses`` shares with the ``other`` one at ``pose``."""
+    key = (id(poses), other.tag, pose.tobytes())
+    if key not in track.overlaps:
+        found = np.zeros(len(poses))
+        tree = cKDTree(other.outline(pose))
+        near = np.hypot(*(poses[:, :2] - pose[:2]).T) < track.shape.size + other.shape.size
         for n in np.flatnonzero(near):
             apart, _ = tree.query(track.outline(poses[n]), distance_upper_bound=_SHARED_M)
-            total[n] += _SHARED * np.count_nonzero(np.isfinite(apart))
-    return total
+            found[n] = _SHARED * np.count_nonzero(np.isfinite(apart))
+        track.overlaps[key] = found
+    return track.overlaps[key]

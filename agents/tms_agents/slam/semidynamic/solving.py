@@ -46,7 +46,7 @@ def solve(
         shape = shape_of(model)
         families = (_hinged if model.hinged else _free)(sights, model, shape, random)
         tracks[tag] = Track(tag, shape, visits, families)
-    choose(tracks)
+    choose(tracks, np.random.default_rng([seed, len(tracks)]))
     return {
         tag: [Stay(visit, pose) for visit, pose in zip(track.visits, _chosen(track), strict=True)]
         for tag, track in tracks.items()
