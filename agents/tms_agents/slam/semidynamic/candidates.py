@@ -72,7 +72,9 @@ def _from_surfaces(sight: Sight, model: ObjectModel, shape: Shape, random: np.ra
     if not len(cells):
         return np.empty((0, 3))
     telling = sight.cells.seen[cells[:, 0], cells[:, 1]] + _WALLS * sight.cells.always[cells[:, 0], cells[:, 1]]
-    cells = cells[random.choice(len(cells), size=_FROM_SURFACES, p=telling / telling.sum())]
+    shares = np.cumsum(telling) / telling.sum()
+    drawn = np.searchsorted(shares, random.uniform(size=_FROM_SURFACES))
+    cells = cells[np.minimum(drawn, len(cells) - 1)]
     at = sight.place.corner + (cells[:, ::-1] + 0.5) * CELL_M
     points = shape.outline[random.integers(len(shape.outline), size=_FROM_SURFACES)]
     antenna = seen_from[random.integers(len(seen_from), size=_FROM_SURFACES)]
