@@ -1,0 +1,104 @@
+"""When the estimate is made anew, and what it says: of a drive that goes on meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+
+from tms_agents.robot.estimating import Task, Update
+from tms_agents.robot.records import Drive, Pose, Snapshot, placed
+from tms_agents.slam.geometry import Floats, compose, inverse
+from tms_agents.slam.semidynamic import Antenna, Models, ObjectModel, Rounds
+from tms_agents.slam.settings import Settings
+from tms_schemas.maps import MapObject
+
+#: There is nothing to estimate before the robot has driven so far, nor anew before it has driven that much on (m).
+_LEAST_M, _MORE_M = 0.5, 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """What is known of the robot itself: ``laser`` (3,) on it, antennas by number."""
+
+    laser: Floats
+    antennas: Mapping[int, Antenna]
+
+
+class Online:
+    """``drive`` takes the records; ``task`` is made where ``due`` says why, ``taken`` tells what came of it.
+
+    Between updates the robot's pose goes on by odometry from the last one.
+    """
+
+    def __init__(self, robot: Robot, drive: Drive, settings: Settings, resolution: float, every_s: float) -> None:
+        self.drive = drive
+        self._robot, self._settings, self._resolution, self._every_s = robot, settings, resolution, every_s
+        self._anchor: Floats | None = None
+        self._begun_at = -np.inf
+        self._begun_m, self._begun_parked = 0.0, False
+        self.updates = 0
+
+    def due(self, now: float) -> str:
+        """Why an update should begin now (monotonic s); empty where none should."""
+        drive = self.drive
+        if drive.driven_m < _LEAST_M or drive.driven_m - self._begun_m < _MORE_M:
+            return ""
+        if drive.parked and not self._begun_parked:
+            return "parked"
+        if drive.fresh:
+            return "a tag came into sight"
+        return "while driving" if now - self._begun_at >= self._every_s else ""
+
+    def task(self, now: float, shapes: Mapping[str, ObjectModel]) -> tuple[Snapshot, Task] | None:
+        """All that is known by now, with the shapes of tagged things; None where there is nothing yet."""
+        snapshot = self.drive.snapshot()
+        if snapshot is None:
+            return None
+        self._begun_at, self._begun_m, self._begun_parked = now, self.drive.driven_m, self.drive.parked
+        self.drive.fresh.clear()
+        rounds = _of_antennas(snapshot.rounds, self._robot.antennas)
+        seen = frozenset().union(*rounds.tags)
+        models = Models(
+            self._robot.laser, self._robot.antennas, {tag: one for tag, one in shapes.items() if tag in seen}
+        )
+        return snapshot, Task(snapshot.log, rounds, models, self._settings, self._resolution)
+
+    def taken(self, snapshot: Snapshot, update: Update) -> None:
+        self.updates += 1
+        self._anchor = compose(update.poses[-1], inverse(snapshot.log.odometry[-1]))
+
+    def pose(self) -> Pose | None:
+        """Of the robot in the map's frame now."""
+        if self.drive.pose is None:
+            return None
+        if self._anchor is None:
+            self._anchor = inverse(np.array(self.drive.pose))
+        return placed(self._anchor, self.drive.pose)
+
+
+def map_objects(update: Update, times: Floats, ahead_s: float) -> list[MapObject]:
+    """As the server keeps them; ``ahead_s`` is how far Unix time is ahead of the scans' ``times`` (S,)."""
+    found = []
+    for tag, one in sorted(update.objects.items()):
+        x, y, theta = (float(value) for value in one.pose)
+        found.append(
+            MapObject(
+                tag=tag,
+                x=x,
+                y=y,
+                theta=theta,
+                state=None if one.door is None else one.door.state,
+                angle=None if one.door is None else one.door.angle,
+                seen_at=datetime.fromtimestamp(float(times[one.last]) + ahead_s, UTC),
+            )
+        )
+    return found
+
+
+def _of_antennas(rounds: Rounds, antennas: Mapping[int, Antenna]) -> Rounds:
+    kept = np.isin(rounds.antenna, list(antennas))
+    tags = tuple(tags for tags, keep in zip(rounds.tags, kept, strict=True) if keep)
+    return Rounds(rounds.t[kept], rounds.antenna[kept], tags)
