@@ -38,16 +38,18 @@ class Online:
         self._robot, self._settings, self._resolution, self._every_s = robot, settings, resolution, every_s
         self._anchor: Floats | None = None
         self._begun_at = -np.inf
-        self._begun_m, self._begun_parked = 0.0, False
+        self._begun_m, self._begun = 0.0, (0, False)
         self.updates = 0
 
     def due(self, now: float) -> str:
         """Why an update should begin now (monotonic s); empty where none should."""
         drive = self.drive
-        if drive.driven_m < _LEAST_M or drive.driven_m - self._begun_m < _MORE_M:
+        if drive.driven_m < _LEAST_M:
             return ""
-        if drive.parked and not self._begun_parked:
+        if drive.parked and self._begun != (drive.legs, True):
             return "parked"
+        if drive.driven_m - self._begun_m < _MORE_M:
+            return ""
         if drive.fresh:
             return "a tag came into sight"
         return "while driving" if now - self._begun_at >= self._every_s else ""
@@ -57,7 +59,8 @@ class Online:
         snapshot = self.drive.snapshot()
         if snapshot is None:
             return None
-        self._begun_at, self._begun_m, self._begun_parked = now, self.drive.driven_m, self.drive.parked
+        self._begun_at, self._begun_m = now, self.drive.driven_m
+        self._begun = self.drive.legs, self.drive.parked
         self.drive.fresh.clear()
         rounds = _of_antennas(snapshot.rounds, self._robot.antennas)
         seen = frozenset().union(*rounds.tags)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from tms_agents.simulation.room import FLOOR_AGENT, ROBOT_AGENT
+from tms_agents.simulation.room import FLOOR_AGENT, MAPPER_AGENT, ROBOT_AGENT
 from tms_agents.simulation.service import stop
 from tms_client.cli import CommandError
 
@@ -35,7 +35,7 @@ class Agents:
 
 def command(name: str, config: Path) -> list[str]:
     """How the agent is started, behind ``tms``."""
-    kind = {ROBOT_AGENT: "hand", FLOOR_AGENT: "floor"}.get(name, "cabinet")
+    kind = {ROBOT_AGENT: "hand", FLOOR_AGENT: "floor", MAPPER_AGENT: "robot"}.get(name, "cabinet")
     return ["agent", kind, "--config", str(config)]
 
 
