@@ -93,6 +93,9 @@ class ObjectsSection(Section):
 
     #: A robot that has stood still for so long is parked: things may be moved then.
     parked_s: Seconds = 20.0
+    #: The server's map goes on, from where the robot was when the agent ended (it must not be moved while it is off);
+    #: without a map, or not knowing where it was, ``map.start`` counts. False: the map is made anew.
+    continues: bool = False
     #: Everything since the beginning is estimated anew each time; more scans than these are not taken.
     most_scans: Annotated[int, Field(ge=100, le=200_000)] = 20_000
 

@@ -11,10 +11,9 @@ import asyncio
 import contextlib
 import json
 import logging
-import multiprocessing
 import time
 from collections.abc import AsyncGenerator, Callable
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from datetime import UTC, datetime
 
@@ -22,17 +21,20 @@ import numpy as np
 
 from tms_agents.devices.transport import DeviceState
 from tms_agents.robot.config import LiveSource, LogSource, ObjectsSection, RobotConfig
-from tms_agents.robot.estimating import Update, estimate, prepare
+from tms_agents.robot.estimating import Update
+from tms_agents.robot.estimator import Estimator
 from tms_agents.robot.live_devices import device_records
 from tms_agents.robot.map_uploader import MapUploader
 from tms_agents.robot.records import Drive, Pose, Record, Snapshot, placed
 from tms_agents.robot.replaying import replayed
 from tms_agents.robot.shapes import Shapes
-from tms_agents.robot.updates import Online, Robot, map_objects
+from tms_agents.robot.updates import Earlier, Online, Robot, map_objects
 from tms_agents.running import Posted, Running, running
+from tms_agents.slam.geometry import Floats, between
 from tms_agents.slam.semidynamic import Antenna, parse_models
 from tms_agents.slam.settings import Settings
-from tms_client import Town, TownError
+from tms_agents.state import load_state, save_state, state_path
+from tms_client import NotFound, Town, TownError, Unreachable
 from tms_client.cli import CommandError
 from tms_client.flows import NO_RETRY
 from tms_schemas.maps import MapIn
@@ -65,7 +67,7 @@ async def run(
     with (
         Town(config.server.url, config.server.key, retry=NO_RETRY) as town,
         ThreadPoolExecutor(1, "server") as thread,
-        contextlib.closing(_Estimator()) as estimator,
+        contextlib.closing(Estimator()) as estimator,
     ):
         async with running(
             config, drain_s=drain_s, heartbeat_s=config.heartbeat_s, posted=posted, clock=clock
@@ -100,31 +102,6 @@ def _recording(
     return replayed(config.source, even)
 
 
-class _Estimator:
-    """A process of its own; another one where it died."""
-
-    def __init__(self) -> None:
-        self._pool: ProcessPoolExecutor | None = None
-
-    async def __call__(self, task: object) -> Update:
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=prepare)
-        try:
-            return await asyncio.get_running_loop().run_in_executor(self._pool, estimate, task)  # type: ignore[arg-type]
-        except BrokenProcessPool:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """What is under way is given up."""
-        if self._pool is not None:
-            for process in list((self._pool._processes or {}).values()):
-                process.kill()
-            self._pool.shutdown(wait=True, cancel_futures=True)
-        self._pool = None
-
-
 class _Mind:
     def __init__(
         self,
@@ -133,7 +110,7 @@ class _Mind:
         robot: Robot,
         town: Town,
         thread: ThreadPoolExecutor,
-        estimator: _Estimator,
+        estimator: Estimator,
         *,
         live: bool,
         clock: Callable[[], float],
@@ -149,6 +126,8 @@ class _Mind:
         self._told: Pose | None = None
         self._told_at = -np.inf
         self._ahead_s = 0.0
+        self._continues, self._map_to_room = section.continues, config.map.start
+        self._state = state_path(config.spool.path)
         self._there = self._said_full = False
         self._trouble = ""
 
@@ -156,6 +135,8 @@ class _Mind:
         self, items: AsyncGenerator[tuple[str, Record | DeviceState], None], agent: Running, drain_s: float
     ) -> None:
         label = agent.new_label()
+        if self._continues:
+            await asyncio.get_running_loop().run_in_executor(self._thread, self._go_on)
         update: asyncio.Task[None] | None = None
         try:
             async with contextlib.aclosing(items) as arriving:
@@ -165,18 +146,46 @@ class _Mind:
                         continue
                     self._take(item)
                     await self._tell(agent, label)
-                    if (update is None or update.done()) and (why := self._online.due(self._even())):
-                        if update is not None:
-                            update.result()
+                    if update is not None and update.done():
+                        update.result()  # a mistake of ours is not passed over in silence
+                        update = None
+                    if update is None and (why := self._online.due(self._even())):
                         update = asyncio.create_task(self._update(why))
             if update is not None:
                 await update
             await self._update("the whole drive", patience_s=drain_s)
             await self._tell(agent, label, now=True)
         finally:
+            self._remember()
             if update is not None:
                 update.cancel()
                 await asyncio.gather(update, return_exceptions=True)
+
+    def _go_on(self) -> None:
+        """Takes over the server's map, where there is one and the robot knows where it is in it."""
+        about = self._config.map
+        try:
+            found = self._town.map(about.id)
+        except (NotFound, Unreachable) as error:
+            log.warning("map %s is made anew: %s", about.id, error)
+            return
+        pose = _pose_in(found.map_to_room, about.start)
+        saved = load_state(self._state, self._config.agent)
+        if saved.get("map") == about.id:
+            pose = np.array(saved["pose"], dtype=np.float64)
+        if not found.version or pose is None or abs(found.resolution - self._config.resolution) > 1e-9:
+            log.warning("map %s is made anew: it is empty, of other cells, or the robot's place is not known", about.id)
+            return
+        self._online.earlier = Earlier(
+            found.occupancy.astype(np.float64), found.origin, found.resolution, found.objects, pose, found.map_to_room
+        )
+        self._map_to_room = found.map_to_room
+        log.info("map %s goes on from version %d", about.id, found.version)
+
+    def _remember(self) -> None:
+        """Where the robot is in the map, for the next run."""
+        if self._online.updates and (pose := self._online.pose()) is not None:
+            save_state(self._state, self._config.agent, {"map": self._config.map.id, "pose": list(pose)})
 
     def _take(self, record: Record) -> None:
         drive = self._online.drive
@@ -189,7 +198,7 @@ class _Mind:
             log.error("%d scans are as many as are taken; what comes now is not mapped", drive.most_scans)
 
     async def _tell(self, agent: Running, label: str, *, now: bool = False) -> None:
-        start, pose = self._config.map.start, self._online.pose()
+        start, pose = self._map_to_room, self._online.pose()
         if start is None or pose is None or (not now and self._even() - self._told_at < _TELL_S):
             return
         there = placed(np.array(start), pose)
@@ -201,24 +210,31 @@ class _Mind:
 
     async def _update(self, why: str, patience_s: float | None = None) -> None:
         loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._thread, self._shapes.learn, frozenset(self._online.drive.tags))
+        tags = set(self._online.drive.tags)
+        if self._online.earlier is not None:
+            tags |= {one.tag for one in self._online.earlier.objects}
+        await loop.run_in_executor(self._thread, self._shapes.learn, tags)
         made = self._online.task(self._even(), self._shapes.known)
         if made is None:
             return
         snapshot, task = made
+        if self._online.drive.parked and patience_s is None:
+            why = "parked"  # meanwhile
         try:
             update = await self._estimator(task)
         except (ValueError, ArithmeticError, IndexError, BrokenProcessPool, np.linalg.LinAlgError) as error:
             log.error("no update (%s): %s: %s", why, type(error).__name__, error)
             return
         self._online.taken(snapshot, update)
+        self._remember()
         log.info("%s: %s", why, in_words(snapshot, update))
         await loop.run_in_executor(self._thread, self._send, snapshot, update, why, patience_s)
 
     def _send(self, snapshot: Snapshot, update: Update, why: str, patience_s: float | None) -> None:
         """A refusal is said once; the robot drives on."""
-        grid = update.grid.probabilities(), update.grid.origin
-        objects = map_objects(update, snapshot.times, self._ahead_s)
+        grid = update.occupancy, update.origin
+        earlier = self._online.earlier
+        objects = map_objects(update, snapshot.times, self._ahead_s, () if earlier is None else earlier.objects)
         note = f"{why}: {in_words(snapshot, update)}"
         try:
             self._require()
@@ -233,7 +249,7 @@ class _Mind:
                 log.error("map %s: %s", self._config.map.id, error)
 
     def _require(self) -> None:
-        if not self._there:
+        if not self._there and self._online.earlier is None:
             about = self._config.map
             fields = MapIn(room=self._config.room, resolution=self._config.resolution, map_to_room=about.start)
             self._town.maps.put(about.id, fields)
@@ -246,6 +262,10 @@ def in_words(snapshot: Snapshot, update: Update) -> str:
         f"{len(snapshot.log)} scans, {len(update.objects)} objects, {doors.count('open')} of {len(doors)} doors open, "
         f"computed in {update.seconds:.1f} s ({update.cpu_seconds:.1f} s of processor)"
     )
+
+
+def _pose_in(frame: Pose | None, pose: Pose | None) -> Floats | None:
+    return None if frame is None or pose is None else between(np.array(frame), np.array(pose))
 
 
 def _moved(one: Pose, other: Pose) -> bool:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
 
+from tms_agents.robot.continuing import Before
 from tms_agents.robot.estimating import Task, Update
 from tms_agents.robot.records import Drive, Pose, Snapshot, placed
 from tms_agents.slam.geometry import Floats, compose, inverse
 from tms_agents.slam.semidynamic import Antenna, Models, ObjectModel, Rounds
+from tms_agents.slam.semidynamic.shapes import surface
 from tms_agents.slam.settings import Settings
 from tms_schemas.maps import MapObject
 
@@ -27,6 +29,28 @@ class Robot:
     antennas: Mapping[int, Antenna]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Earlier:
+    """A map of the server that goes on: its cells (see ``Before``), its objects; ``pose`` (3,) of the robot in it when
+    this drive began, about; ``map_to_room`` as the server has it."""
+
+    occupancy: Floats
+    origin: tuple[float, float]
+    resolution: float
+    objects: Sequence[MapObject]
+    pose: Floats
+    map_to_room: Pose | None
+
+    def before(self, shapes: Mapping[str, ObjectModel]) -> Before:
+        """For the estimator, with the outlines of the objects whose shapes are known."""
+        outlines = {
+            one.tag: surface(shapes[one.tag], np.array([one.x, one.y, one.theta]))
+            for one in self.objects
+            if one.tag in shapes
+        }
+        return Before(self.occupancy, self.origin, self.resolution, outlines, self.pose)
+
+
 class Online:
     """``drive`` takes the records; ``task`` is made where ``due`` says why, ``taken`` tells what came of it.
 
@@ -35,6 +59,8 @@ class Online:
 
     def __init__(self, robot: Robot, drive: Drive, settings: Settings, resolution: float, every_s: float) -> None:
         self.drive = drive
+        #: The map that goes on.
+        self.earlier: Earlier | None = None
         self._robot, self._settings, self._resolution, self._every_s = robot, settings, resolution, every_s
         self._anchor: Floats | None = None
         self._begun_at = -np.inf
@@ -67,7 +93,8 @@ class Online:
         models = Models(
             self._robot.laser, self._robot.antennas, {tag: one for tag, one in shapes.items() if tag in seen}
         )
-        return snapshot, Task(snapshot.log, rounds, models, self._settings, self._resolution)
+        before = None if self.earlier is None else self.earlier.before(shapes)
+        return snapshot, Task(snapshot.log, rounds, models, self._settings, self._resolution, before)
 
     def taken(self, snapshot: Snapshot, update: Update) -> None:
         self.updates += 1
@@ -78,13 +105,15 @@ class Online:
         if self.drive.pose is None:
             return None
         if self._anchor is None:
-            self._anchor = inverse(np.array(self.drive.pose))
+            begun = np.zeros(3) if self.earlier is None else self.earlier.pose
+            self._anchor = compose(begun, inverse(np.array(self.drive.pose)))
         return placed(self._anchor, self.drive.pose)
 
 
-def map_objects(update: Update, times: Floats, ahead_s: float) -> list[MapObject]:
-    """As the server keeps them; ``ahead_s`` is how far Unix time is ahead of the scans' ``times`` (S,)."""
-    found = []
+def map_objects(update: Update, times: Floats, ahead_s: float, earlier: Sequence[MapObject] = ()) -> list[MapObject]:
+    """As the server keeps them; ``ahead_s`` is how far Unix time is ahead of the scans' ``times`` (S,). What was not
+    seen in this drive stays as it was ``earlier``."""
+    found = [one for one in earlier if one.tag not in update.objects]
     for tag, one in sorted(update.objects.items()):
         x, y, theta = (float(value) for value in one.pose)
         found.append(

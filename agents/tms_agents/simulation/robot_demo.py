@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tms_agents.simulation.robot_stage import RobotStage
 
 #: The estimator compiles at its first start.
-_CONNECT_S, _UPDATE_S = 60.0, 300.0
+_CONNECT_S, _UPDATE_S = 60.0, 180.0
 _PARKED_S = 2.0
 _NAMES = ("Door of room 1", "Door of room 2", "Bin at the window", "Bin at the wall")
 

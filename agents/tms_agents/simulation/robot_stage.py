@@ -63,7 +63,6 @@ class RobotStage:
         self.reader = LlrpEmulator(period_s=_LOOK_S)
         self.base_port = self.laser_port = 0
         self.base_path = ""
-        self._loop = asyncio.new_event_loop()
         self._unplug = asyncio.Event()
 
     @property
@@ -144,7 +143,7 @@ class RobotStage:
 
     def start_devices(self) -> Callable[[], None]:
         """Plug in; the answer pulls all plugs."""
-        return served(self._loop, self.serve, self._unplug)
+        return served(asyncio.new_event_loop(), self.serve, self._unplug)
 
 
 @contextmanager
