@@ -227,8 +227,8 @@ class _Mind:
             return
         self._online.taken(snapshot, update)
         self._remember()
-        log.info("%s: %s", why, in_words(snapshot, update))
         await loop.run_in_executor(self._thread, self._send, snapshot, update, why, patience_s)
+        log.info("%s: %s", why, in_words(snapshot, update))
 
     def _send(self, snapshot: Snapshot, update: Update, why: str, patience_s: float | None) -> None:
         """A refusal is said once; the robot drives on."""

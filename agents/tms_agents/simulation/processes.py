@@ -32,6 +32,10 @@ class Agents:
         lines = log.read_text(errors="replace").splitlines() if log is not None else []
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
 
+    def said(self, name: str, text: str) -> int:
+        """How often an agent's log has it."""
+        return self._logs[name].read_text(errors="replace").count(text)
+
 
 def command(name: str, config: Path) -> list[str]:
     """How the agent is started, behind ``tms``."""

@@ -126,7 +126,7 @@ def map_id(room: str) -> str:
 class _Story:
     def __init__(self, town: Town, room: str, stage: RobotStage, agents: Agents, say: Callable[[str], None]) -> None:
         self._town, self._room, self._stage, self._agents, self._say = town, room, stage, agents, say
-        self._version = 0
+        self._version = self._legs = 0
 
     def play(self) -> bool:
         stage = self._stage
@@ -154,6 +154,7 @@ class _Story:
     def _leg(self) -> bool:
         """Drive, wait for the map of all of it, show the doors; whether they are right."""
         self._stage.drive()
+        self._legs += 1
         self._wait(lambda: self._stage.standing, _UPDATE_S, "the robot does not arrive")
         self._wait(self._parked, _UPDATE_S, "the agent makes no map of the drive")
         doors = {one.tag: one for one in self._town.doors(self._room)}
@@ -170,22 +171,23 @@ class _Story:
         return right
 
     def _parked(self) -> bool:
-        """An update of this leg was made after the robot parked; new versions are told on the way."""
-        found = self._new_versions()
-        return any(one.note.startswith("parked") for one in found)
+        """An update was made since the robot parked; new versions are told on the way. One that changes nothing makes
+        no version, so the agent is listened to."""
+        made = self._agents.said(MAPPER_AGENT, "INFO parked: ") >= self._legs
+        self._new_versions()
+        return made
 
-    def _new_versions(self) -> list[MapVersion]:
+    def _new_versions(self) -> None:
         try:
             versions = self._town.maps.versions(map_id(self._room))
             found = _until(versions, self._version)
         except NotFound:
-            return []
+            return
         for one in reversed(found):
             self._version = one.version
             known = self._town.map(map_id(self._room), version=one.version)
             area = np.isfinite(known.occupancy).sum() * known.resolution**2
             self._say(f"    version {one.version}: {area:5.1f} m2 known; {one.note}")
-        return found
 
     def _wait(self, done: Callable[[], bool], patience_s: float, otherwise: str) -> None:
         until = time.monotonic() + patience_s
