@@ -34,10 +34,12 @@ class Shapes:
             except NotFound as error:
                 self._unknown[tag] = self._clock() + _AGAIN_S
                 self._once(tag, str(error))
-            except (TownError, ValueError) as error:
+            except ValueError as error:
+                self._unknown[tag] = self._clock() + _AGAIN_S
                 self._once(tag, str(error))
-                if isinstance(error, ValueError):
-                    self._unknown[tag] = self._clock() + _AGAIN_S
+            except TownError as error:
+                self._once(tag, str(error))
+                return  # the others would wait as long for nothing
             else:
                 self.known[tag] = found
 
