@@ -18,7 +18,7 @@ from tms_agents.slam.geometry import Floats, compose, transform
 from tms_agents.slam.gridmap import GridMap
 
 #: A distance that counts half (m), the farthest that counts, and how many points of walls are compared.
-_SIGMA_M, _FARTHEST_M, _POINTS = 0.03, 0.3, 1500
+_SIGMA_M, _FARTHEST_M, _POINTS = 0.03, 0.3, 600
 #: Rounds of the search: steps (m, rad), so many to each side.
 _ROUNDS = ((0.08, 0.03, 3), (0.03, 0.01, 3), (0.01, 0.004, 3), (0.004, 0.0015, 3))
 #: Cells so near to an object's outline (m) are the object's.
