@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from tms_agents.devices.arcos import ArcosSession
+from tms_agents.devices.arcos.codec import MAX_PACKET, Packet, PacketParser
+from tms_agents.devices.arcos.sip import Status
 from tms_agents.devices.cola import ColaSession
 from tms_agents.devices.cola.framing import MAX_FRAME as MAX_COLA
 from tms_agents.devices.cola.framing import Dialect
@@ -281,6 +284,16 @@ def _cola_frames() -> Target:
 
 
 #: Every parser of bytes that come from a device. A new driver adds its line here.
+_ARCOS = [
+    Packet(0).encode(),
+    Packet(1).encode(),
+    Packet(2, b"Name\0Pioneer\0p3dx-sh\0").encode(),
+    Status(moving=False, x=5, y=0x7FFF, heading=-2048, left=0, right=0, battery=126).encode().encode(),
+    Status(moving=True, x=9, y=1, heading=7, left=3, right=-3, battery=110, sonars=((0, 500), (7, 5000)), rotation=-12)
+    .encode()
+    .encode(),
+]
+
 TARGETS: list[tuple[str, Callable[[], Target]]] = [
     ("lines", _parser(LineParser, _LONGEST_TEXT, [*_BOARD, *_SCALES["and"]])),
     ("tr3 frames", _parser(Tr3Parser, MAX_FRAME, _TR3)),
@@ -293,6 +306,8 @@ TARGETS: list[tuple[str, Callable[[], Target]]] = [
         "thingmagic session",
         _session(lambda clock: ThingMagicSession(antennas=(1, 2), clock=clock), _MOST_THINGMAGIC, _THINGMAGIC),
     ),
+    ("arcos packets", _parser(PacketParser, MAX_PACKET, _ARCOS)),
+    ("arcos session", _session(lambda clock: ArcosSession(drives=True, clock=clock), MAX_PACKET, _ARCOS)),
     ("scanner", _session(lambda clock: ScannerSession(clock=clock), _LONGEST_TEXT, _SCANNER)),
     ("text reader", _session(lambda clock: TextReaderSession(clock=clock), _LONGEST_TEXT, _TEXT_READER)),
     ("rdm6300 frames", _parser(Rdm6300Parser, _RDM_FRAME, _RDM6300)),

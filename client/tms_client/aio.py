@@ -31,6 +31,7 @@ from tms_client.posting import AsyncPoster
 from tms_client.spool import Spool
 from tms_schemas.agents import AgentView
 from tms_schemas.belief import AnomaliesAnswer, LabelsAnswer, MoversAnswer, PlacementsAnswer
+from tms_schemas.maps import Door, DoorState
 from tms_schemas.objects import (
     CatalogueImport,
     IntakeResult,
@@ -142,6 +143,10 @@ class AsyncTown:
 
     async def anomalies(self, room: str, *, at: datetime | None = None) -> AnomaliesAnswer:
         return await self._run(self._api.anomalies(room, at))
+
+    async def doors(self, room: str, *, state: DoorState | None = None) -> Sequence[Door]:
+        """Which doors of a room are open, as robots saw them last; ``state`` leaves out all others."""
+        return (await self._run(self._api.doors(room, state))).doors
 
     async def post(self, batch: ObservationBatch) -> BatchAccepted:
         """Post numbered observations at once, without a spool; returns when they are durable on the server."""

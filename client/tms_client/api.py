@@ -15,6 +15,8 @@ from tms_client.flows import Call, Flow, Retry, as_model, exchange, nothing
 from tms_schemas.agents import AgentPage, AgentView
 from tms_schemas.belief import AnomaliesAnswer, LabelsAnswer, MoversAnswer, PlacementsAnswer
 from tms_schemas.maps import (
+    DoorsAnswer,
+    DoorState,
     MapDiff,
     MapIn,
     MapObjects,
@@ -181,8 +183,14 @@ class Api:
     def map_objects(self, map: str, version: int | None = None) -> Flow[MapObjects]:
         return self._get(MapObjects, f"/v1/maps/{_q(map)}/objects", version=version)
 
-    def map_diff(self, map: str, before: int, after: int | None = None) -> Flow[MapDiff]:
-        return self._get(MapDiff, f"/v1/maps/{_q(map)}/diff", before=before, after=after)
+    def map_diff(
+        self, map: str, before: int, after: int | None = None, least_m: float = 0.0, least_rad: float = 0.0
+    ) -> Flow[MapDiff]:
+        path = f"/v1/maps/{_q(map)}/diff"
+        return self._get(MapDiff, path, before=before, after=after, least_m=least_m, least_rad=least_rad)
+
+    def doors(self, room: str, state: DoorState | None = None) -> Flow[DoorsAnswer]:
+        return self._get(DoorsAnswer, f"/v1/rooms/{_q(room)}/doors", state=state)
 
     def map_file(self, map: str, suffix: str, **params: object) -> Flow[bytes]:
         """``suffix`` is what follows the map's id in the path, such as ``.png``."""

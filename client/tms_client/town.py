@@ -31,6 +31,7 @@ from tms_client.posting import Poster
 from tms_client.spool import Spool
 from tms_schemas.agents import AgentView
 from tms_schemas.belief import AnomaliesAnswer, LabelsAnswer, MoversAnswer, PlacementsAnswer
+from tms_schemas.maps import Door, DoorState
 from tms_schemas.objects import (
     CatalogueImport,
     IntakeResult,
@@ -141,6 +142,10 @@ class Town:
 
     def anomalies(self, room: str, *, at: datetime | None = None) -> AnomaliesAnswer:
         return self._run(self._api.anomalies(room, at))
+
+    def doors(self, room: str, *, state: DoorState | None = None) -> Sequence[Door]:
+        """Which doors of a room are open, as robots saw them last; ``state`` leaves out all others."""
+        return self._run(self._api.doors(room, state)).doors
 
     def post(self, batch: ObservationBatch) -> BatchAccepted:
         """Post numbered observations at once, without a spool; returns when they are durable on the server."""

@@ -59,6 +59,10 @@ class MapObject(Model):
     theta: Annotated[float, Field(ge=-1e3, le=1e3)]
     #: What it is in: a door may be "open" or "closed".
     state: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00]+$")] | None = None
+    #: How far a door is turned from where it is closed (rad, counter-clockwise).
+    angle: Annotated[float, Field(ge=-1e3, le=1e3)] | None = None
+    #: When the robot last had it before its sensors.
+    seen_at: UtcTime | None = None
 
 
 class TileIn(Model):
@@ -155,11 +159,16 @@ class MapObjects(Model):
 
 
 class ObjectChange(Model):
-    """``before`` is null for an object that is new, ``after`` for one that is gone."""
+    """``before`` is null for an object that is new, ``after`` for one that is gone.
+
+    ``moved_m`` and ``turned_rad`` (0 to pi) tell how far it is from where it was, for one that is in both.
+    """
 
     tag: Tag
     before: MapObject | None
     after: MapObject | None
+    moved_m: float | None = None
+    turned_rad: float | None = None
 
 
 class MapDiff(Model):
@@ -176,6 +185,33 @@ class MapDiff(Model):
     became_known: int
     became_unknown: int
     objects: list[ObjectChange]
+
+
+DoorState = Literal["open", "closed", "unknown"]
+
+
+class Door(Model):
+    """A door as the newest version of a map has it; ``state`` is unknown where no robot could tell."""
+
+    tag: Tag
+    #: As the object database has it; null for a door that is not registered.
+    name: str | None
+    state: DoorState
+    #: Turned so far from where it is closed (rad, counter-clockwise), where that is known.
+    angle: float | None
+    #: When a robot last had it before its sensors; when the version was made, where the robot did not say.
+    seen_at: UtcTime
+    map: MapId
+    version: Version
+    #: Its hinge, and where the panel points, in the map frame.
+    pose: Pose
+    #: The same in the room frame; null where nobody knows where the map lies in the room.
+    room_pose: Pose | None
+
+
+class DoorsAnswer(Model):
+    #: By tag.
+    doors: list[Door]
 
 
 #: What a picture shows.

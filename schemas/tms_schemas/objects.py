@@ -60,6 +60,7 @@ class ObjectFields(Model):
     category: Name | None = None
     room: RoomId | None = None
     tracking: Tracking = "placement"
+    shape: Shape | None = None
     tag_pose: Pose | None = None
     user_memory: UserMemory | None = None
 
@@ -76,6 +77,7 @@ class ObjectPatch(Model):
     category: Name | None = None
     room: RoomId | None = None
     tracking: Tracking | None = None
+    shape: Shape | None = None
     tag_pose: Pose | None = None
     user_memory: UserMemory | None = None
 
@@ -94,7 +96,7 @@ class ObjectPage(Model):
 
 
 class ObjectModel(Model):
-    """Geometry for mapping: class, polygon and parts from the product, tag pose the object's own."""
+    """Geometry for mapping: class, polygon and parts of the object's own shape or its product's, and its tag pose."""
 
     tag: Tag
     class_: str = Field(alias="class")

@@ -34,7 +34,7 @@ def main(argv: Sequence[str]) -> int:
     )
     _kind(kinds, "cabinet", "smart cabinet: boards with load cells or scales, and tag readers", _cabinet)
     _kind(kinds, "floor", "lasers over the floor: Hokuyo SCIP, SICK LMS2xx, TiM, LMS1xx, LMS5xx", _floor)
-    _kind(kinds, "robot", "a robot that maps while it drives: a recorded drive", _robot)
+    _kind(kinds, "robot", "a robot that maps while it drives: a recorded drive, or laser, wheels, tag reader", _robot)
     arguments = parser.parse_args(argv)
     done: int = arguments.work(arguments)
     return done
@@ -89,6 +89,8 @@ def _robot(arguments: argparse.Namespace) -> int:
     try:
         from tms_agents.commands.slam_log import load
         from tms_agents.robot.config import RobotConfig
+        from tms_agents.robot.objects_runner import robot_of
+        from tms_agents.robot.objects_runner import run as run_with_objects
         from tms_agents.robot.runner import run as run_robot
     except ImportError as error:
         if error.name is None or error.name.startswith("tms_"):
@@ -96,6 +98,12 @@ def _robot(arguments: argparse.Namespace) -> int:
         raise CommandError(f'the robot agent needs {error.name}: pip install "robot-town-tms[slam]"') from error
 
     config = read_config(arguments.config, RobotConfig)
+    if config.objects is not None:
+        source = config.source or config.live
+        assert source is not None
+        _run(config, run_with_objects(config, robot_of(source), drain_s=_STOP_S))
+        return 0
+    assert config.source is not None
     recorded = load(config.source.path, config.source.models)
     _run(config, run_robot(config, recorded, drain_s=_STOP_S))
     return 0

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FrameType
 
 from tms_agents.simulation.demo import Plan, run
+from tms_agents.simulation.robot_demo import run as run_robot
 from tms_agents.simulation.terminal import Terminal
 from tms_client.cli import ArgumentParser, CommandError
 
@@ -36,6 +37,11 @@ def main(argv: Sequence[str]) -> int:
         help="an emulated laser and its agent see the floor, or a floor sensor without device does "
         "(default: the laser, where people walk as people do: --speed 0.5 to 1.25)",
     )
+    parser.add_argument(
+        "--robot",
+        action="store_true",
+        help="another story: a robot maps a ward with laser, wheels and tag reader while doors are moved",
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the sensors' noise (default 0)")
     parser.add_argument("--url", help="use this running server instead of starting one")
     parser.add_argument("--key", help="API key for --url (scope admin)")
@@ -50,7 +56,11 @@ def main(argv: Sequence[str]) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _leave)
     try:
-        return 0 if run(Plan(**vars(arguments)), Terminal(sys.stdout)) else 1
+        robot = vars(arguments).pop("robot")
+        if robot and (arguments.weights or arguments.laser is not None):
+            raise CommandError("--weights and --laser belong to the other story, not to --robot")
+        tell = run_robot if robot else run
+        return 0 if tell(Plan(**vars(arguments)), Terminal(sys.stdout)) else 1
     except KeyboardInterrupt:
         sys.stdout.write("\n")
         return 0 if not arguments.once else 130

@@ -6,13 +6,13 @@ A version holds the whole map, so one that did not get through is made up for by
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from tms_client import Busy, Conflict, ServerFault, Town, TownError, Unreachable
-from tms_schemas.maps import MapVersion
+from tms_schemas.maps import MapObject, MapVersion
 
 #: Occupancy (H, W) and the lower left corner of its first cell (m).
 Grid = tuple[npt.NDArray[np.float64], tuple[float, float]]
@@ -57,8 +57,26 @@ class MapUploader:
             self._fails(error)
         self._due = self._clock() + self._every_s
 
-    def finish(self, grid: Grid, patience_s: float) -> MapVersion:
-        """Sends the last state; tried again for so long.
+    def send(self, grid: Grid, note: str, objects: Sequence[MapObject]) -> MapVersion | None:
+        """Sends it now, with all semi-dynamic objects; None in an outage of the server, which passes.
+
+        Raises:
+            TownError: the server refuses it, or somebody else changed the map.
+        """
+        try:
+            return self._send(grid, note, objects)
+        except _OUTAGE as error:
+            self._fails(error)
+            return None
+
+    def finish(
+        self,
+        grid: Grid,
+        patience_s: float,
+        note: str = "the whole drive",
+        objects: Sequence[MapObject] | None = None,
+    ) -> MapVersion:
+        """Sends the last state; tried again for so long. ``objects`` None leaves those there are.
 
         Raises:
             TownError: it did not get through.
@@ -66,22 +84,22 @@ class MapUploader:
         until = self._clock() + patience_s
         while True:
             try:
-                return self._send(grid, "the whole drive")
+                return self._send(grid, note, objects)
             except _OUTAGE as error:
                 self._fails(error)
                 if self._clock() >= until:
                     raise
                 self._sleep(_PAUSE_S)
 
-    def _send(self, grid: Grid, note: str) -> MapVersion:
+    def _send(self, grid: Grid, note: str, objects: Sequence[MapObject] | None = None) -> MapVersion:
         try:
-            made = self._upload(grid, note, None)
+            made = self._upload(grid, note, objects, None)
         except Conflict:
             # Our own version whose answer was lost is nothing to stop for.
             newest = next(self._town.maps.versions(self._map))
             if newest.agent != self._agent:
                 raise
-            made = self._upload(grid, note, newest.version)
+            made = self._upload(grid, note, objects, newest.version)
         self.versions += made.version != self._last
         self._last = made.version
         if self._out:
@@ -89,9 +107,11 @@ class MapUploader:
             self._say(f"the server is back; map {self._map} is at version {made.version}")
         return made
 
-    def _upload(self, grid: Grid, note: str, base: int | None) -> MapVersion:
+    def _upload(self, grid: Grid, note: str, objects: Sequence[MapObject] | None, base: int | None) -> MapVersion:
         occupancy, origin = grid
-        return self._town.maps.upload(self._map, occupancy, origin, agent=self._agent, note=note, base=base, snap=True)
+        return self._town.maps.upload(
+            self._map, occupancy, origin, agent=self._agent, objects=objects, note=note, base=base, snap=True
+        )
 
     def _fails(self, error: TownError) -> None:
         if not self._out:

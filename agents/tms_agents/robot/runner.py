@@ -46,7 +46,7 @@ async def run(
         SpoolError: the spool cannot be opened.
     """
     posted = Posted()
-    settings = Settings(particles=config.map.particles, resolution=config.map.resolution, seed=config.map.seed)
+    settings = Settings(particles=config.map.particles, resolution=config.resolution, seed=config.map.seed)
     mapper = Mapper(recorded, settings, config.map.start)
     with (
         Town(config.server.url, config.server.key, retry=NO_RETRY) as town,
@@ -78,6 +78,7 @@ async def _drive(
     async def call(work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(thread, work)
 
+    assert config.source is not None
     label = agent.new_label()
     await agent.device("log", now(), DeviceState("connected", config.source.path.name))
     # Whatever an earlier run told of the body is no more.
@@ -115,7 +116,7 @@ class _Charts:
         if not self._there:
             about = self._config.map
             self._town.maps.put(
-                about.id, MapIn(room=self._config.room, resolution=about.resolution, map_to_room=about.start)
+                about.id, MapIn(room=self._config.room, resolution=self._config.resolution, map_to_room=about.start)
             )
             self._there = True
 

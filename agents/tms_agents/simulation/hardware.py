@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import AsyncExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -90,20 +90,32 @@ class Hardware:
 
     def start(self) -> Callable[[], None]:
         """Plug in; the answer pulls all plugs."""
-        ready = threading.Event()
-        thread = threading.Thread(
-            target=lambda: self._loop.run_until_complete(self.serve(ready.set)), name="devices", daemon=True
-        )
-        thread.start()
-        if not ready.wait(30.0):
-            raise OSError("the emulated devices cannot be plugged in")
+        return served(self._loop, self.serve, self._unplug)
 
-        def stop() -> None:
-            self._loop.call_soon_threadsafe(self._unplug.set)
-            thread.join(10.0)
-            self._loop.close()
 
-        return stop
+def served(
+    loop: asyncio.AbstractEventLoop,
+    serve: Callable[[Callable[[], object]], Coroutine[Any, Any, None]],
+    unplug: asyncio.Event,
+) -> Callable[[], None]:
+    """Run ``serve`` in a thread with ``loop`` until the answer is called; ``serve`` says when it is ready, and ends
+    when ``unplug`` is set.
+
+    Raises:
+        OSError: the devices are not ready in time.
+    """
+    ready = threading.Event()
+    thread = threading.Thread(target=lambda: loop.run_until_complete(serve(ready.set)), name="devices", daemon=True)
+    thread.start()
+    if not ready.wait(30.0):
+        raise OSError("the emulated devices cannot be plugged in")
+
+    def stop() -> None:
+        loop.call_soon_threadsafe(unplug.set)
+        thread.join(10.0)
+        loop.close()
+
+    return stop
 
 
 def _floor_bench(rng: np.random.Generator) -> FloorBench:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from tms_agents.simulation.room import FLOOR_AGENT, ROBOT_AGENT
+from tms_agents.simulation.room import FLOOR_AGENT, MAPPER_AGENT, ROBOT_AGENT
 from tms_agents.simulation.service import stop
 from tms_client.cli import CommandError
 
@@ -32,10 +32,14 @@ class Agents:
         lines = log.read_text(errors="replace").splitlines() if log is not None else []
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
 
+    def said(self, name: str, text: str) -> int:
+        """How often an agent's log has it."""
+        return self._logs[name].read_text(errors="replace").count(text)
+
 
 def command(name: str, config: Path) -> list[str]:
     """How the agent is started, behind ``tms``."""
-    kind = {ROBOT_AGENT: "hand", FLOOR_AGENT: "floor"}.get(name, "cabinet")
+    kind = {ROBOT_AGENT: "hand", FLOOR_AGENT: "floor", MAPPER_AGENT: "robot"}.get(name, "cabinet")
     return ["agent", kind, "--config", str(config)]
 
 

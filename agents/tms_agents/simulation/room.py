@@ -26,6 +26,8 @@ from tms_schemas.rooms import Furniture, RoomIn, Sensor, Surface, Zone
 PERSON, ROBOT = "person", "robot"
 TABLE_SURFACE, TABLE_Z = "table/top", 0.7
 FLOOR_AGENT, ROBOT_AGENT = "floor", "robot"
+#: Maps a ward in the demo of the robot.
+MAPPER_AGENT = "mapper"
 #: Where the things of the experiment are at its start: cabinet -> numbers of the objects, slot by slot.
 START: Mapping[str, tuple[int, ...]] = {"cabinet-a": (0, 1, 2, 3), "cabinet-b": (4, 5, 6), "cabinet-c": (7, 8, 9)}
 

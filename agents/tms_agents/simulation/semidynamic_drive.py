@@ -17,7 +17,7 @@ from tms_agents.simulation.floor_world.shapes import Shapes
 from tms_agents.simulation.semidynamic_plans import PLANS, Plan, Thing
 
 Floats = NDArray[np.float64]
-_LASER = (0.12, 0.0, 0.0)
+LASER = (0.12, 0.0, 0.0)
 #: Nothing comes back from farther (m); beams; what the laser says then.
 _REACH_M, _BEAMS, _NONE = 8.0, 361, 8.191
 _SPEED, _TURN = 0.45, 0.7
@@ -49,8 +49,8 @@ def record(plan_name: str, seed: int, folder: Path, devices: Devices | None = No
     how = devices or Devices()
     plan = PLANS[plan_name](layout)
     tags = {f"E2F0{seed:04X}{number:016X}": thing for number, thing in enumerate(plan.things)}
-    t, truth, legs = _driven(plan)
-    odometry = _odometry(t, truth, how, driving)
+    t, truth, legs = driven(plan)
+    odometry = odometry_of(t, truth, how, driving)
     changes = _intervals(plan, t, truth, legs)
     records = [
         {"t": round(float(time), 3), "type": "odom", "x": pose[0], "y": pose[1], "theta": pose[2]}
@@ -59,18 +59,18 @@ def record(plan_name: str, seed: int, folder: Path, devices: Devices | None = No
     scan_poses, reads = [], {tag: [0] * plan.passes for tag in tags}
     for n in range(0, len(t), 2):
         now = _current(changes, t[n])
-        walls, owners = _surfaces(plan, now)
+        walls, owners = surfaces(plan, now)
         records.append(_scan(t[n] + 0.013, truth[n], walls, owners, how, sensing))
         scan_poses.append([round(float(t[n] + 0.013), 3), *truth[n].round(5).tolist()])
     fading = {tag: sensing.normal(0, how.fading_db, (97, 97)) for tag in tags}
     still = plan.walls
     for number, antenna in enumerate(plan.antennas):
         for time in _rounds(t, legs, number):
-            pose = _at(t, truth, time)
+            pose = pose_at(t, truth, time)
             now = _current(changes, time)
             seen = []
             for index, (tag, thing) in enumerate(tags.items()):
-                power = _power(_compose(pose, antenna), _compose(thing.poses[now[index]], thing.tag), still, how)
+                power = power_at(compose(pose, antenna), compose(thing.poses[now[index]], thing.tag), still, how)
                 spot = (pose[:2] / 0.15).astype(int) % 97
                 if power + fading[tag][spot[0], spot[1]] > 0 and sensing.random() < how.works:
                     seen.append({"id": tag, "rssi": round(-60 + 0.5 * round(2 * power), 1)})
@@ -80,7 +80,7 @@ def record(plan_name: str, seed: int, folder: Path, devices: Devices | None = No
     folder.mkdir(parents=True, exist_ok=True)
     with gzip.open(folder / "stream.jsonl.gz", "wt") as file:
         file.writelines(json.dumps(one) + "\n" for one in records)
-    (folder / "models.json").write_text(json.dumps(_models(plan, tags)))
+    (folder / "models.json").write_text(json.dumps(models_of(plan, tags)))
     objects = {
         tag: {
             "label": thing.label,
@@ -108,7 +108,7 @@ def record(plan_name: str, seed: int, folder: Path, devices: Devices | None = No
     (folder / "truth.json").write_text(json.dumps(document))
 
 
-def _driven(plan: Plan) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def driven(plan: Plan) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Times at 10 Hz, true poses (N, 3), number of the leg: a leg ends where the robot is parked."""
     ways = [plan.route] if plan.laps == 0 else [np.concatenate([plan.route, *[plan.route[1:]] * (plan.laps - 1)])]
     ways = ways * (1 if plan.laps else plan.passes)
@@ -141,7 +141,7 @@ def _driven(plan: Plan) -> tuple[Floats, Floats, NDArray[np.int64]]:
     return np.concatenate(t), np.concatenate(poses), np.concatenate(legs)
 
 
-def _odometry(t: Floats, truth: Floats, how: Devices, random: np.random.Generator) -> Floats:
+def odometry_of(t: Floats, truth: Floats, how: Devices, random: np.random.Generator) -> Floats:
     scale, turning = 1 + random.normal(0, how.scale), 1 + random.normal(0, how.turning)
     pull = random.normal(0, how.pull)
     pose, found = np.zeros(3), [np.zeros(3)]
@@ -190,7 +190,7 @@ def _current(changes: list[list[tuple[float, float]]], t: float) -> list[int]:
     return [next(k for k, (begin, end) in enumerate(spans) if begin <= t < end) for spans in changes]
 
 
-def _surfaces(plan: Plan, now: list[int]) -> tuple[Floats, NDArray[np.int64]]:
+def surfaces(plan: Plan, now: list[int]) -> tuple[Floats, NDArray[np.int64]]:
     pieces = [plan.walls]
     for thing, k in zip(plan.things, now, strict=True):
         for part in thing.parts:
@@ -205,7 +205,7 @@ def _scan(
     still = np.column_stack([walls, np.zeros((len(walls), 2))])
     none = np.zeros((0, 5)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
     shapes = Shapes(still, np.full(len(walls), -1, dtype=np.int64), np.zeros((len(walls), 3)), *none)
-    at = _compose(pose, _LASER)
+    at = compose(pose, LASER)
     step = np.pi / (_BEAMS - 1)
     met = cast(shapes, (float(at[0]), float(at[1]), float(at[2])), -np.pi / 2, step, _BEAMS, 0.0).ranges
     ranges = np.round(met + random.normal(0, how.noise_m, _BEAMS), 3)
@@ -231,7 +231,7 @@ def _rounds(t: Floats, legs: NDArray[np.int64], number: int) -> Floats:
     return np.concatenate([np.arange(a + 0.031 + 0.06 * number, b, 0.125) for a, b in spans])
 
 
-def _power(antenna: Floats, tag: Floats, walls: Floats, how: Devices) -> float:
+def power_at(antenna: Floats, tag: Floats, walls: Floats, how: Devices) -> float:
     """dB above what a tag needs: free space, a smooth lobe, a dipole that is turned away, walls between."""
     dx, dy = tag[:2] - antenna[:2]
     distance = max(float(np.hypot(dx, dy)), 0.1)
@@ -256,14 +256,14 @@ def _crossed(a: Floats, b: Floats, walls: Floats) -> bool:
     return bool(((along > 0.02) & (along < 0.95) & (there > 0) & (there < 1)).any())
 
 
-def _models(plan: Plan, tags: dict[str, Thing]) -> dict[str, Any]:
+def models_of(plan: Plan, tags: dict[str, Thing]) -> dict[str, Any]:
     antennas = [
         {"id": n, "pose": pose, "nominal_max_range": 2.0, "nominal_half_beam": np.pi / 3}
         for n, pose in enumerate(plan.antennas)
     ]
     laser = {"nominal_sigma": 0.01, "range_max": _REACH_M, "fov_deg": 180.0, "increment_deg": 0.5}
     return {
-        "robot": {"laser_pose": _LASER, "antennas": antennas, "radius": 0.22, "laser": laser},
+        "robot": {"laser_pose": LASER, "antennas": antennas, "radius": 0.22, "laser": laser},
         "tags": {
             tag: {
                 "class": thing.kind,
@@ -276,12 +276,12 @@ def _models(plan: Plan, tags: dict[str, Thing]) -> dict[str, Any]:
     }
 
 
-def _at(t: Floats, poses: Floats, time: float) -> Floats:
+def pose_at(t: Floats, poses: Floats, time: float) -> Floats:
     turns = np.unwrap(poses[:, 2])
     return np.array([np.interp(time, t, poses[:, 0]), np.interp(time, t, poses[:, 1]), np.interp(time, t, turns)])
 
 
-def _compose(pose: Any, part: Any) -> Floats:
+def compose(pose: Any, part: Any) -> Floats:
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.array([pose[0] + c * part[0] - s * part[1], pose[1] + s * part[0] + c * part[1], pose[2] + part[2]])
 

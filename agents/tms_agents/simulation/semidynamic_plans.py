@@ -136,11 +136,24 @@ def shifted(random: np.random.Generator) -> Plan:
     return plan
 
 
+def ward(random: np.random.Generator) -> Plan:
+    """A short corridor with two doors and two bins; between two passes the one door is closed and the other opened."""
+    while True:
+        plan = _corridor(7.0, 2.3, passes=2)
+        plan.antennas = [(0.1, 0.12, 0.87), (0.1, -0.12, -0.87)]
+        _doors(plan, [(1.9, 1), (4.0, 0)], 2.3, random, ("door_large", "door_small"))
+        _bins(plan, [(1.4, 0), (4.4, 1)], 2.3, random, near=0.4)
+        turned = [[abs(pose[2] - (door.closed or 0.0)) for pose in door.poses] for door in plan.things[:2]]
+        if min(turned[0][0], turned[1][1]) > 0.8 and max(turned[0][1], turned[1][0]) < 1e-9:
+            return plan
+
+
 PLANS: dict[str, Callable[[np.random.Generator], Plan]] = {
     "short": short,
     "long": long,
     "clutter": clutter,
     "room": room,
+    "ward": ward,
     "loop": loop,
     "shifted": shifted,
 }

@@ -37,7 +37,7 @@ def parse_recording(lines: Iterable[str], models: str | None = None) -> Log:
             if record["type"] == "odom":
                 odometry.append(_finite(record["t"], record["x"], record["y"], record["theta"]))
             elif record["type"] == "scan":
-                scans.append(_scan(record))
+                scans.append(scan_of(record))
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             bad += 1
     return put_together(scans, odometry, np.zeros(3) if models is None else parse_laser(models), bad)
@@ -71,7 +71,8 @@ def put_together(scans: list[Scan], odometry: list[tuple[float, float, float, fl
     )
 
 
-def _scan(record: dict[str, Any]) -> Scan:
+def scan_of(record: dict[str, Any]) -> Scan:
+    """Of a record of type ``scan``. Raises ``ValueError``, ``KeyError`` or ``TypeError`` where it is none."""
     ranges = np.asarray(record["ranges"], dtype=np.float64)
     t, first, step, longest = _finite(record["t"], record["angle_min"], record["angle_increment"], record["range_max"])
     light = None if record.get("intensities") is None else np.asarray(record["intensities"], dtype=np.float64)

@@ -1,7 +1,11 @@
-"""``tms catalogue import``: send a product catalogue (CSV) to a server, and say what became of every row."""
+"""``tms catalogue import``: send a product catalogue (CSV) to a server, and say what became of every row.
+
+``tms catalogue models``: register things with their shapes, as a mapper's ``models.json`` has them.
+"""
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import csv
 import io
@@ -12,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tms_client.cli import ArgumentParser, CommandError
+from tms_client.commands import models
 from tms_client.commands.options import add_server_options
 from tms_client.errors import TownError
 from tms_client.town import Town
@@ -23,14 +28,21 @@ _TIMEOUT_S = 120.0
 
 def main(argv: Sequence[str]) -> int:
     """Status 1 where rows were refused; they are named on stderr by line and reason, the others are stored."""
-    parser = ArgumentParser(prog="tms catalogue", description="The product catalogue of a server.")
-    actions = parser.add_subparsers(required=True, metavar="import")
+    parser = ArgumentParser(prog="tms catalogue", description="What a server knows of products and of shapes.")
+    actions = parser.add_subparsers(required=True, metavar="import|models")
+    models.add_options(actions.add_parser("models", help="register the things of a models.json with their shapes"))
     importing = actions.add_parser(
         "import", help="add products from a CSV file with the columns jan, name, size, weight_g, class, shape"
     )
     importing.add_argument("file", type=Path, help="UTF-8 or Shift_JIS, with a header row")
     add_server_options(importing)
+    importing.set_defaults(run=_import_file)
     arguments = parser.parse_args(argv)
+    done: int = arguments.run(arguments)
+    return done
+
+
+def _import_file(arguments: argparse.Namespace) -> int:
     try:
         body = arguments.file.read_bytes()
     except OSError as error:

@@ -18,14 +18,14 @@ from tms_client.flows import Retry, first_error
 from tms_client.maps.files import Recorded, read_folder
 from tms_client.town import Town
 from tms_schemas.base import Pose
-from tms_schemas.maps import MapIn, MapObject, TownMap
+from tms_schemas.maps import DoorsAnswer, MapIn, MapObject, TownMap
 
 _TIMEOUT_S = 60.0
 
 
 def main(argv: Sequence[str]) -> int:
     parser = ArgumentParser(prog="tms map", description="Maps of a server.")
-    actions = parser.add_subparsers(required=True, metavar="upload|get|list|versions|diff|delete")
+    actions = parser.add_subparsers(required=True, metavar="upload|get|list|versions|diff|doors|delete")
     _upload_options(actions.add_parser("upload", help="make a version of a folder of tms slam run, or of a map.yaml"))
     _get_options(actions.add_parser("get", help="write a map as map.pgm, map.yaml, map.png, map.npy"))
     listing = actions.add_parser("list", help="the maps")
@@ -35,6 +35,7 @@ def main(argv: Sequence[str]) -> int:
     versions.add_argument("map")
     versions.set_defaults(run=_versions)
     _diff_options(actions.add_parser("diff", help="what changed from one version to another"))
+    _doors_options(actions.add_parser("doors", help="which doors of a room are open"))
     deleting = actions.add_parser("delete", help="forget a map with all its versions")
     deleting.add_argument("map")
     deleting.set_defaults(run=_delete)
@@ -148,18 +149,27 @@ def _diff_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("before", type=int, help="a version, 0 for the empty map")
     parser.add_argument("after", type=int, nargs="?", help="a version (default: the newest)")
     parser.add_argument("--png", type=Path, metavar="FILE", help="write a picture of it")
+    parser.add_argument("--least-m", type=float, default=0.0, metavar="M", help="leave out what moved less (m)")
+    parser.add_argument("--least-deg", type=float, default=0.0, metavar="D", help="and turned less (degrees)")
     parser.set_defaults(run=_diff)
 
 
 def _diff(town: Town, arguments: argparse.Namespace) -> None:
-    found = town.maps.diff(arguments.map, arguments.before, arguments.after)
+    found = town.maps.diff(
+        arguments.map,
+        arguments.before,
+        arguments.after,
+        least_m=arguments.least_m,
+        least_rad=float(np.radians(arguments.least_deg)),
+    )
     sys.stdout.write(
         f"{arguments.map} from version {found.before} to {found.after}: {len(found.tiles)} tiles changed; "
         f"cells that became occupied {found.became_occupied}, free {found.became_free}, "
         f"known {found.became_known}, unknown {found.became_unknown}\n"
     )
     for one in found.objects:
-        sys.stdout.write(f"  {one.tag}: {_standing(one.before)} -> {_standing(one.after)}\n")
+        by = "" if one.moved_m is None else f" ({one.moved_m:.2f} m, {np.degrees(one.turned_rad or 0.0):.0f} deg)"
+        sys.stdout.write(f"  {one.tag}: {_standing(one.before)} -> {_standing(one.after)}{by}\n")
     if arguments.png is not None:
         with _writing(arguments.png):
             arguments.png.write_bytes(town.maps.diff_png(arguments.map, found.before, found.after))
@@ -170,6 +180,27 @@ def _standing(one: MapObject | None) -> str:
         return "not there"
     state = f", {one.state}" if one.state else ""
     return f"x {one.x:.2f} m, y {one.y:.2f} m, {one.theta:.2f} rad{state}"
+
+
+def _doors_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("room")
+    parser.add_argument("--state", choices=["open", "closed", "unknown"], help="only doors in this state")
+    parser.add_argument("--json", action="store_true", help="print the server's whole answer")
+    parser.set_defaults(run=_doors)
+
+
+def _doors(town: Town, arguments: argparse.Namespace) -> None:
+    doors = town.doors(arguments.room, state=arguments.state)
+    if arguments.json:
+        sys.stdout.write(DoorsAnswer(doors=list(doors)).model_dump_json(indent=2) + "\n")
+        return
+    for one in doors:
+        angle = "" if one.angle is None else f", {np.degrees(one.angle):.0f} deg"
+        at = one.seen_at.isoformat(timespec="seconds")
+        named = f" {one.name}" if one.name else ""
+        sys.stdout.write(f"{one.tag}{named}: {one.state}{angle}  seen {at}  map {one.map} version {one.version}\n")
+    if not doors:
+        sys.stdout.write(f"no {arguments.state + ' ' if arguments.state else ''}doors in room {arguments.room}\n")
 
 
 def _delete(town: Town, arguments: argparse.Namespace) -> None:

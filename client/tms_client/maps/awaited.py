@@ -77,9 +77,14 @@ class AsyncMaps:
         """The semi-dynamic objects as a version has them, the newest by default."""
         return (await self._run(self._api.map_objects(map, version))).objects
 
-    async def diff(self, map: str, before: int, after: int | None = None) -> MapDiff:
-        """What changed from one version to another, the newest by default."""
-        return await self._run(self._api.map_diff(map, before, after))
+    async def diff(
+        self, map: str, before: int, after: int | None = None, *, least_m: float = 0.0, least_rad: float = 0.0
+    ) -> MapDiff:
+        """What changed from one version to another, the newest by default.
+
+        An object that moved less than ``least_m`` and turned less than ``least_rad`` is left out.
+        """
+        return await self._run(self._api.map_diff(map, before, after, least_m, least_rad))
 
     async def png(self, map: str, version: int | None = None, *, layer: Layer = "occupancy") -> bytes:
         """A picture."""

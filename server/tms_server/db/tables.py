@@ -60,6 +60,8 @@ class ObjectRow(Base):
     category: Mapped[str | None]
     room: Mapped[str | None] = mapped_column(ForeignKey("rooms.room"), index=True)
     tracking: Mapped[str]
+    #: Its own; NULL where it is that of its product.
+    shape: Mapped[str | None]
     tag_pose: Mapped[str | None]
     user_memory: Mapped[bytes | None]
     #: Name, synonyms, category (also the product's), tag and JAN, folded for search (objects/search.py).

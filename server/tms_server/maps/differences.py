@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from tms_schemas.maps import MapDiff, MapObjects, ObjectChange, TilePlace
+from tms_schemas.maps import MapDiff, MapObject, MapObjects, ObjectChange, TilePlace
 from tms_schemas.tiles import UNKNOWN
 from tms_server.db.tables import MapRow
 from tms_server.maps.cells import Bytes, free, occupied, tile_cells
@@ -51,7 +52,17 @@ def kinds(old: Bytes, new: Bytes) -> Bytes:
     return found
 
 
-async def pair(session: AnySession, row: MapRow, before: int, after: int | None) -> Pair:
+class Least(NamedTuple):
+    """What moved less and turned less, and is in the same state, has not moved."""
+
+    m: float
+    rad: float
+
+
+ANY = Least(0.0, 0.0)
+
+
+async def pair(session: AnySession, row: MapRow, before: int, after: int | None, least: Least = ANY) -> Pair:
     """Raises ``NotFound``."""
     old, new = await find_version(session, row, before), await find_version(session, row, after)
     tiles = TileRepository(session, row.map)
@@ -63,14 +74,32 @@ async def pair(session: AnySession, row: MapRow, before: int, after: int | None)
         old.version if old else 0,
         new.version if new else 0,
         {place: (bodies.get(was.get(place, "")), bodies.get(now.get(place, ""))) for place in places},
-        _object_changes(await objects_of(session, row, before), await objects_of(session, row, after)),
+        _object_changes(await objects_of(session, row, before), await objects_of(session, row, after), least),
     )
 
 
-def _object_changes(before: MapObjects, after: MapObjects) -> list[ObjectChange]:
+def _object_changes(before: MapObjects, after: MapObjects, least: Least) -> list[ObjectChange]:
     old, new = ({one.tag: one for one in side.objects} for side in (before, after))
-    return [
-        ObjectChange(tag=tag, before=old.get(tag), after=new.get(tag))
-        for tag in sorted(old.keys() | new.keys())
-        if old.get(tag) != new.get(tag)
-    ]
+    changes = [_change(tag, old.get(tag), new.get(tag)) for tag in sorted(old.keys() | new.keys())]
+    return [one for one in changes if _counts(one, least)]
+
+
+def _change(tag: str, before: MapObject | None, after: MapObject | None) -> ObjectChange:
+    if before is None or after is None:
+        return ObjectChange(tag=tag, before=before, after=after)
+    return ObjectChange(
+        tag=tag,
+        before=before,
+        after=after,
+        moved_m=math.hypot(after.x - before.x, after.y - before.y),
+        turned_rad=abs(math.remainder(after.theta - before.theta, math.tau)),
+    )
+
+
+def _counts(change: ObjectChange, least: Least) -> bool:
+    """To be seen again is no change."""
+    if change.moved_m is None or change.turned_rad is None or change.before is None or change.after is None:
+        return True
+    moved = change.moved_m > 0 and change.moved_m >= least.m
+    turned = change.turned_rad > 0 and change.turned_rad >= least.rad
+    return moved or turned or change.before.state != change.after.state

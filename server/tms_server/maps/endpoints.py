@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+from typing import Annotated
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from tms_schemas.base import RoomId
-from tms_schemas.maps import MapId, MapIn, MapPage, TownMap
+from tms_schemas.maps import DoorsAnswer, DoorState, MapId, MapIn, MapPage, TownMap
 from tms_server.auth import Admin, Caller, require_observe, require_see
 from tms_server.db.paging import Cursor, Limit
 from tms_server.db.session import ReadSession, Session
 from tms_server.errors import NotFound
-from tms_server.maps import file_endpoints, service, version_endpoints
+from tms_server.maps import doors, file_endpoints, service, version_endpoints
+from tms_server.rooms import service as rooms
 
 maps = APIRouter(tags=["maps"])
 
@@ -55,6 +57,23 @@ async def put_map(
 async def delete_map(map: MapId, _: Admin, session: Session, request: Request) -> None:
     """Forget the map with all its versions."""
     await service.delete_map(session, request.state.clock, map)
+
+
+@maps.get("/rooms/{room}/doors")
+async def get_doors(
+    room: RoomId,
+    caller: Caller,
+    session: ReadSession,
+    state: Annotated[DoorState | None, Query(description="only doors in this state")] = None,
+) -> DoorsAnswer:
+    """Which doors are open: as the newest versions of the room's maps have them, with the time they were seen.
+
+    A door is an object of a map whose shape has a class that begins with `door`, or that a robot says is open or
+    closed.
+    """
+    require_see(caller, room)
+    await rooms.get_room(session, room)
+    return await doors.doors_of(session, room, state)
 
 
 # After the routes: a router takes over those that exist when it includes another. Files first: ``{map}`` would take

@@ -36,6 +36,10 @@ class MapRepository:
             query = query.where(MapRow.map > after)
         return (await self._session.scalars(query)).all()
 
+    async def of_room(self, room: str) -> Sequence[MapRow]:
+        """By id."""
+        return (await self._session.scalars(select(MapRow).where(MapRow.room == room).order_by(MapRow.map))).all()
+
     async def version(self, map: str, version: int) -> MapVersionRow | None:
         return await self._session.get(MapVersionRow, (map, version))
 
@@ -50,6 +54,16 @@ class MapRepository:
         """JSON of the semi-dynamic objects as ``version`` has them; None where none were ever told."""
         query = (
             select(MapVersionRow.objects)
+            .where(MapVersionRow.map == map, MapVersionRow.version <= version, MapVersionRow.objects.is_not(None))
+            .order_by(MapVersionRow.version.desc())
+            .limit(1)
+        )
+        return await self._session.scalar(query)
+
+    async def objects_made_at(self, map: str, version: int) -> int | None:
+        """When the version was made that told the objects as ``version`` has them (us); None where none were told."""
+        query = (
+            select(MapVersionRow.created_at)
             .where(MapVersionRow.map == map, MapVersionRow.version <= version, MapVersionRow.objects.is_not(None))
             .order_by(MapVersionRow.version.desc())
             .limit(1)

@@ -30,6 +30,9 @@ Wanted = Annotated[int | None, Query(ge=0, lt=2**31, description="a version; the
 Since = Annotated[int, Query(ge=0, lt=2**31, description="the version that the caller has, 0 for none")]
 Before = Annotated[int, Query(ge=0, lt=2**31, description="a version; 0 is the empty map")]
 
+LeastM = Annotated[float, Query(ge=0, le=1e6, description="an object that moved less (m) has not moved")]
+LeastRad = Annotated[float, Query(ge=0, le=4, description="an object that turned less (rad) has not turned")]
+
 
 @router.get("/maps/{map}/versions")
 async def list_versions(
@@ -107,9 +110,17 @@ async def get_objects(map: MapId, caller: Caller, session: ReadSession, version:
 
 
 @router.get("/maps/{map}/diff")
-async def get_diff(map: MapId, caller: Caller, session: ReadSession, before: Before, after: Wanted = None) -> MapDiff:
+async def get_diff(
+    map: MapId,
+    caller: Caller,
+    session: ReadSession,
+    before: Before,
+    after: Wanted = None,
+    least_m: LeastM = 0.0,
+    least_rad: LeastRad = 0.0,
+) -> MapDiff:
     """Which tiles changed from one version to another, how many cells became what, which objects moved."""
     row = await service.find(session, map)
     require_see(caller, row.room)
-    found = await differences.pair(session, row, before, after)
+    found = await differences.pair(session, row, before, after, differences.Least(least_m, least_rad))
     return await asyncio.to_thread(found.counts)

@@ -89,7 +89,13 @@ async def post_version(
 
 
 def objects_json(objects: list[MapObject]) -> str:
-    return json.dumps([one.model_dump() for one in sorted(objects, key=lambda one: one.tag)], ensure_ascii=False)
+    return json.dumps([_written(one) for one in sorted(objects, key=lambda one: one.tag)], ensure_ascii=False)
+
+
+def _written(one: MapObject) -> dict[str, object]:
+    """Fields that came later are left out where nothing is said: so versions made before them compare as equal."""
+    fields = one.model_dump(mode="json")
+    return {name: value for name, value in fields.items() if value is not None or name == "state"}
 
 
 async def _earlier(maps: MapRepository, row: MapRow, base: int, request: str) -> MapVersionRow:

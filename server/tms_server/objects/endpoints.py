@@ -54,7 +54,8 @@ async def list_objects(
 
 @objects.get("/objects/{tag}")
 async def get_object(tag: Tag, caller: Caller, session: ReadSession) -> TownObject:
-    """What is known of the object; size, weight and category are its product's where it has none of its own."""
+    """What is known of the object; size, weight, category and shape are its product's
+    where it has none of its own."""
     found = await service.get_object(session, tag)
     require_see(caller, found.room)
     return found
@@ -84,7 +85,7 @@ async def delete_object(tag: Tag, _: Admin, session: Session, request: Request) 
 
 @objects.get("/objects/{tag}/model")
 async def get_model(tag: Tag, caller: Caller, session: ReadSession) -> ObjectModel:
-    """Geometry for mapping: class, polygon and parts from the product, the tag's pose the object's own."""
+    """Geometry for mapping: the object's own shape, or its product's; the tag's pose on it is its own."""
     require_see(caller, (await service.get_object(session, tag)).room)
     return await service.get_model(session, tag)
 

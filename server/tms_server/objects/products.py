@@ -18,9 +18,8 @@ from tms_server.errors import NotFound
 from tms_server.objects.changes import record_changes
 from tms_server.objects.repository import ObjectRepository, ProductRepository
 from tms_server.objects.search import words
-from tms_server.objects.service import checked_jan
+from tms_server.objects.service import checked_jan, require_shape
 from tms_server.objects.views import object_columns, own_fields, product_columns, town_product, tracked
-from tms_server.rooms.polygons import require_area
 from tms_server.rooms.repository import RoomRepository
 
 
@@ -31,9 +30,7 @@ async def put_product(session: AsyncSession, clock: Clock, jan: str, fields: Pro
         Invalid: a wrong check digit, or a polygon of the shape without area.
     """
     canonical = checked_jan(jan)
-    if fields.shape is not None:
-        parts = ((f"shape/parts/{i}", part) for i, part in enumerate(fields.shape.parts))
-        require_area([("shape/polygon", fields.shape.polygon), *parts])
+    require_shape(fields.shape)
     await take_turn(session)
     new = await store_products(session, clock, {canonical: fields})
     return Product(jan=canonical, **dict(fields)), bool(new)

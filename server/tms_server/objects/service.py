@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from tms_schemas.objects import ObjectFields, ObjectModel, ObjectPatch, TownObject
+from tms_schemas.objects import ObjectFields, ObjectModel, ObjectPatch, Shape, TownObject
 from tms_schemas.problem import ProblemItem
 from tms_server.clock import Clock
 from tms_server.db.session import ReadOnlySession
@@ -18,6 +18,7 @@ from tms_server.objects.changes import record_changes
 from tms_server.objects.gtin import InvalidGtin, canonical_gtin
 from tms_server.objects.repository import ObjectRepository, ProductRepository
 from tms_server.objects.views import Stored, object_columns, own_fields, shape, town_object, tracked
+from tms_server.rooms.polygons import require_area
 from tms_server.rooms.repository import RoomRepository
 
 
@@ -30,8 +31,9 @@ async def put_object(session: AsyncSession, clock: Clock, tag: str, fields: Obje
     """Store the object. The same fields again change nothing, in the table and in the log.
 
     Raises:
-        Invalid: a JAN with a wrong check digit or outside the catalogue, or an unknown room.
+        Invalid: a JAN with a wrong check digit or outside the catalogue, an unknown room, or a shape without area.
     """
+    require_shape(fields.shape)
     await take_turn(session)
     return await store(session, clock, tag, await ObjectRepository(session).get(tag), fields)
 
@@ -47,6 +49,7 @@ async def patch_object(session: AsyncSession, clock: Clock, tag: str, patch: Obj
     await take_turn(session)
     before = await find(session, tag)
     fields = ObjectFields.model_validate(dict(own_fields(before.object)) | changes)
+    require_shape(fields.shape)
     return (await store(session, clock, tag, before, fields)).object
 
 
@@ -69,9 +72,9 @@ async def get_object(session: AsyncSession | ReadOnlySession, tag: str) -> TownO
 async def get_model(session: AsyncSession | ReadOnlySession, tag: str) -> ObjectModel:
     """Geometry for mapping. Raises ``NotFound`` where there is no object, or no shape is known."""
     found = await find(session, tag)
-    known = None if found.product is None else shape(found.product)
+    known = shape(found)
     if known is None:
-        raise NotFound(f"no shape is known for {tag}: its product has none")
+        raise NotFound(f"no shape is known for {tag}: neither it nor its product has one")
     return ObjectModel(
         tag=tag,
         polygon=known.polygon,
@@ -111,6 +114,13 @@ async def store(session: AsyncSession, clock: Clock, tag: str, before: Stored | 
     await session.flush()
     await record_changes(session, [(was, tracked(after))], now)
     return Put(town_object(after), created=before is None)
+
+
+def require_shape(shape: Shape | None) -> None:
+    """Raises ``Invalid`` naming the polygons that enclose no area."""
+    if shape is not None:
+        parts = ((f"shape/parts/{i}", part) for i, part in enumerate(shape.parts))
+        require_area([("shape/polygon", shape.polygon), *parts])
 
 
 def checked_jan(digits: str, where: str = "jan") -> str:

@@ -29,6 +29,7 @@ def town_object(stored: Stored) -> TownObject:
         "weight_g": weight_g,
         "weight_sd_g": weight_sd_g,
         "category": category(row.category, product),
+        "shape": shape(stored),
     }
     return TownObject(
         tag=row.tag,
@@ -49,6 +50,7 @@ def own_fields(row: ObjectRow) -> ObjectFields:
         category=row.category,
         room=row.room,
         tracking=row.tracking,
+        shape=_shape(row.shape),
         tag_pose=_load(row.tag_pose),
         user_memory=None if row.user_memory is None else row.user_memory.hex(),
     )
@@ -65,6 +67,7 @@ def object_columns(fields: ObjectFields, product: ProductRow | None, tag: str) -
         "category": fields.category,
         "room": fields.room,
         "tracking": fields.tracking,
+        "shape": _shape_json(fields.shape),
         "tag_pose": _dump(fields.tag_pose),
         "user_memory": None if fields.user_memory is None else bytes.fromhex(fields.user_memory),
         "search_text": searched(tag, fields.name, fields.synonyms, fields.jan, category(fields.category, product)),
@@ -110,6 +113,11 @@ def category(own: str | None, product: ProductRow | None) -> str | None:
     return own if own is not None or product is None else product.category
 
 
+def shape(stored: Stored) -> Shape | None:
+    row, product = stored
+    return _shape(row.shape) or (_shape(product.shape) if product else None)
+
+
 def product_fields(row: ProductRow) -> ProductIn:
     return ProductIn(
         name=row.name,
@@ -117,7 +125,7 @@ def product_fields(row: ProductRow) -> ProductIn:
         weight_g=row.weight_g,
         weight_sd_g=row.weight_sd_g,
         category=row.category,
-        shape=shape(row),
+        shape=_shape(row.shape),
     )
 
 
@@ -132,13 +140,17 @@ def product_columns(jan: str, fields: ProductIn) -> dict[str, Any]:
         "weight_g": fields.weight_g,
         "weight_sd_g": fields.weight_sd_g,
         "category": fields.category,
-        "shape": None if fields.shape is None else fields.shape.model_dump_json(by_alias=True),
+        "shape": _shape_json(fields.shape),
         "search_text": search_text([fields.name, fields.category, jan]),
     }
 
 
-def shape(row: ProductRow) -> Shape | None:
-    return None if row.shape is None else Shape.model_validate_json(row.shape)
+def _shape(text: str | None) -> Shape | None:
+    return None if text is None else Shape.model_validate_json(text)
+
+
+def _shape_json(shape: Shape | None) -> str | None:
+    return None if shape is None else shape.model_dump_json(by_alias=True)
 
 
 def _dump(value: Any) -> str | None:
