@@ -13,8 +13,8 @@ from tms_agents.slam.keyframes import KeyScans
 from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.maps import padded
 from tms_agents.slam.matching import curvatures
-from tms_agents.slam.mending import mended
 from tms_agents.slam.posegraph import Edges, Indices, optimise
+from tms_agents.slam.recent import recent_path
 from tms_agents.slam.settings import Settings
 from tms_agents.slam.submaps import GROUP, Submaps
 
@@ -44,16 +44,14 @@ class Closed:
 
 
 def close_loops(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Closed:
-    """``path`` (K, 3) of the robot at the key scans, bent until revisits fit, by their ``lights``, too."""
-    again = mended(path, keys, settings, lights)
+    """``path`` (K, 3) of the robot at the key scans, or the same way again by the newest scans alone, bent until
+    revisits fit, by their ``lights``, too."""
     closed = _closed(path, keys, settings, lights)
-    if np.allclose(again, path, atol=1e-6):
+    # Which of the two is truer from step to step is seen best by how many revisits fit in then.
+    again = _closed(recent_path(path, keys, settings, lights), keys, settings, lights)
+    if again.believed - again.rejected <= closed.believed - closed.rejected:
         return closed
-    # Whether a jump of the filter was right is seen best by how many revisits fit in then.
-    other = _closed(again, keys, settings, lights)
-    if other.believed - other.rejected <= closed.believed - closed.rejected:
-        return closed
-    return replace(other, moved=float(np.hypot(*(other.path - path)[:, :2].T).max()))
+    return replace(again, moved=float(np.hypot(*(again.path - path)[:, :2].T).max()))
 
 
 def _closed(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None) -> Closed:
