@@ -30,6 +30,8 @@ _SWITCH, _DROP = 10.0, 30.0
 #: The precision of a scan's match is that of so few independent witnesses; never better than this (m, rad).
 _WITNESSES, _FLOOR = 8.0, (0.004, 0.004, 0.0015)
 _ROUNDS = 3
+#: A step of the path is torn where it is so many standard deviations of odometry off.
+_TORN = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,12 +48,23 @@ class Closed:
 def close_loops(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Closed:
     """``path`` (K, 3) of the robot at the key scans, or the same way again by the newest scans alone, bent until
     revisits fit, by their ``lights``, too."""
-    closed = _closed(path, keys, settings, lights)
-    # Which of the two is truer from step to step is seen best by how many revisits fit in then.
-    again = _closed(recent_path(path, keys, settings, lights), keys, settings, lights)
-    if again.believed - again.rejected <= closed.believed - closed.rejected:
+    again = recent_path(path, keys, settings, lights)
+    closed, other = (_closed(one, keys, settings, lights) for one in (path, again))
+    # Which of the two is truer from step to step is seen best by how many revisits fit in then, and by odometry.
+    if _merit(other, again, keys, settings) <= _merit(closed, path, keys, settings):
         return closed
-    return replace(again, moved=float(np.hypot(*(again.path - path)[:, :2].T).max()))
+    return replace(other, moved=float(np.hypot(*(other.path - path)[:, :2].T).max()))
+
+
+def _merit(closed: Closed, path: Floats, keys: KeyScans, settings: Settings) -> int:
+    """What bears ``path`` (K, 3) out less what contradicts it: revisits, and steps that odometry cannot be so wrong
+    of."""
+    motions = between(keys.odometry[:-1], keys.odometry[1:])
+    off = between(path[:-1], path[1:]) - motions
+    off[:, 2] = wrapped(off[:, 2])
+    noise = settings.noise.covariance(motions, np.diff(keys.driven, axis=0))
+    squares = np.einsum("ki,kij,kj->k", off, np.linalg.inv(noise), off)
+    return closed.believed - closed.rejected - int(np.count_nonzero(squares > _TORN**2))
 
 
 def _closed(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None) -> Closed:
