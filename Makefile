@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-localise bench-light faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -16,6 +16,7 @@ help:
 	@echo "make bench-floor    floor sensing on simulated rooms (FLOOR='--quick' for a few minutes)"
 	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
 	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
+	@echo "make bench-threads  laser mapping with one and with two threads, by the clock on the wall"
 	@echo "make bench-localise  localisation from anywhere in known maps (LOCALISE='--worlds intel')"
 	@echo "make bench-light    received light in mapping, on simulated places (LIGHT='--places corridor')"
 	@echo "make faults    the long fault tests (30 kills and more)"
@@ -56,6 +57,10 @@ floor-pictures: $(READY)
 
 bench-slam: $(READY)
 	$(BIN)/python benchmarks/slam.py $(SLAM)
+
+# Alone on the computer: wall time.
+bench-threads: $(READY)
+	$(BIN)/python benchmarks/slam.py --only threads
 
 bench-localise: $(READY)
 	$(BIN)/python benchmarks/localise.py $(LOCALISE)

@@ -28,7 +28,7 @@ class Drive:
     by which they are misplaced, ``rooms`` the share of doors that are open.
 
     The wheels: deviation of the turn per root of m driven (rad) and per rad, its constant part per m, deviation of the
-    way per root of m. The laser: noise and longest range (m), share of beams that are lost.
+    way per root of m. The laser: noise and longest range (m), share of beams that are lost, beams over half a turn.
 
     ``people`` are met per 10 m of way, seen as ``legs`` or as bodies.
     """
@@ -47,6 +47,7 @@ class Drive:
     noise_m: float = 0.015
     range_max: float = 50.0
     lost: float = 0.02
+    beams: int = 180
     people: float = 0.0
     legs: bool = True
 
@@ -65,8 +66,9 @@ class Driven:
     people: NDArray[np.bool_]
 
 
-#: Corners of the corridors' middle lines, and the way through them.
-PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[int, int]], list[int]]] = {
+#: Corners of the corridors' middle lines, which of them corridors join, and the way from corner to corner.
+Plan = tuple[list[tuple[float, float]], list[tuple[int, int]], list[int]]
+PLANS: dict[str, Plan] = {
     # A small ring, driven twice: quick.
     "block": (
         [(0, 0), (24, 0), (24, 12), (0, 12)],
@@ -109,24 +111,26 @@ PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[int, int]], list[in
 }
 
 
-def drive(plan: str, how: Drive) -> Driven:
-    """The whole way through one of `PLANS`, with all noise drawn from ``how.seed``."""
+def drive(plan: str | Plan, how: Drive) -> Driven:
+    """The whole way through one of `PLANS`, or another one, with all noise drawn from ``how.seed``."""
     random = np.random.default_rng(how.seed)
-    corners, corridors, way = PLANS[plan]
+    corners, corridors, way = PLANS[plan] if isinstance(plan, str) else plan
     points = np.array(corners, dtype=np.float64)
     walls = edges(_rectangles(points, corridors, how, random))
     fine = path_through(points[way], random)
     truth, odometry = _rolled(fine, how, random)
-    angles = -np.pi / 2 + np.pi / 180 * np.arange(180.0)
+    angles = -np.pi / 2 + np.pi / how.beams * np.arange(float(how.beams))
     t = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T) + 0.2)]) / 0.5
     # People are drawn apart: the same building and drive with and without them.
     around = passers(t, truth, how.people, how.legs, np.random.default_rng([how.seed, 1]))
-    ranges, people = np.empty((len(truth), 180)), np.zeros((len(truth), 180), dtype=bool)
+    ranges, people = np.empty((len(truth), how.beams)), np.zeros((len(truth), how.beams), dtype=bool)
     for n, pose in enumerate(truth):
         circles = np.concatenate([np.zeros((0, 3)), *(one.circles(float(t[n])) for one in around)])
-        met = cast(_shapes(walls, circles), (pose[0], pose[1], pose[2]), float(angles[0]), np.pi / 180, 180, 0.0)
-        noisy = np.round(met.ranges + random.normal(0, how.noise_m, 180), 2)
-        returned = (met.ranges < how.range_max) & (random.uniform(0.0, 1.0, 180) >= how.lost)
+        # A tour winds round and round; the caster knows two turns.
+        seen_from = (pose[0], pose[1], (pose[2] + np.pi) % (2 * np.pi) - np.pi)
+        met = cast(_shapes(walls, circles), seen_from, float(angles[0]), np.pi / how.beams, how.beams, 0.0)
+        noisy = np.round(met.ranges + random.normal(0, how.noise_m, how.beams), 2)
+        returned = (met.ranges < how.range_max) & (random.uniform(0.0, 1.0, how.beams) >= how.lost)
         ranges[n] = np.where(returned, noisy, NO_RETURN)
         people[n] = returned & (met.owners == _PERSON)
     return Driven(t, truth, odometry, ranges, angles, walls, people)

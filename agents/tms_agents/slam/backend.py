@@ -13,8 +13,8 @@ from tms_agents.slam.keyframes import KeyScans
 from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.maps import padded
 from tms_agents.slam.matching import curvatures
-from tms_agents.slam.mending import mended
 from tms_agents.slam.posegraph import Edges, Indices, optimise
+from tms_agents.slam.recent import recent_path
 from tms_agents.slam.settings import Settings
 from tms_agents.slam.submaps import GROUP, Submaps
 
@@ -30,6 +30,8 @@ _SWITCH, _DROP = 10.0, 30.0
 #: The precision of a scan's match is that of so few independent witnesses; never better than this (m, rad).
 _WITNESSES, _FLOOR = 8.0, (0.004, 0.004, 0.0015)
 _ROUNDS = 3
+#: A step of the path is torn where it is so many standard deviations of odometry off.
+_TORN = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,16 +46,25 @@ class Closed:
 
 
 def close_loops(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None = None) -> Closed:
-    """``path`` (K, 3) of the robot at the key scans, bent until revisits fit, by their ``lights``, too."""
-    again = mended(path, keys, settings, lights)
-    closed = _closed(path, keys, settings, lights)
-    if np.allclose(again, path, atol=1e-6):
-        return closed
-    # Whether a jump of the filter was right is seen best by how many revisits fit in then.
-    other = _closed(again, keys, settings, lights)
-    if other.believed - other.rejected <= closed.believed - closed.rejected:
+    """``path`` (K, 3) of the robot at the key scans, or the same way again by the newest scans alone, bent until
+    revisits fit, by their ``lights``, too."""
+    again = recent_path(path, keys, settings, lights)
+    closed, other = (_closed(one, keys, settings, lights) for one in (path, again))
+    # Which of the two is truer from step to step is seen best by how many revisits fit in then, and by odometry.
+    if _merit(other, again, keys, settings) <= _merit(closed, path, keys, settings):
         return closed
     return replace(other, moved=float(np.hypot(*(other.path - path)[:, :2].T).max()))
+
+
+def _merit(closed: Closed, path: Floats, keys: KeyScans, settings: Settings) -> int:
+    """What bears ``path`` (K, 3) out less what contradicts it: revisits, and steps that odometry cannot be so wrong
+    of."""
+    motions = between(keys.odometry[:-1], keys.odometry[1:])
+    off = between(path[:-1], path[1:]) - motions
+    off[:, 2] = wrapped(off[:, 2])
+    noise = settings.noise.covariance(motions, np.diff(keys.driven, axis=0))
+    squares = np.einsum("ki,kij,kj->k", off, np.linalg.inv(noise), off)
+    return closed.believed - closed.rejected - int(np.count_nonzero(squares > _TORN**2))
 
 
 def _closed(path: Floats, keys: KeyScans, settings: Settings, lights: Sequence[LightScan] | None) -> Closed:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import njit, parallel_chunksize, prange
 from numpy.typing import NDArray
 
 from tms_agents.slam.agreement import agreement
@@ -94,11 +94,12 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[li
         starts, scores = np.empty((len(some), 3)), np.empty(len(some))
         searched, place = np.unique(which[some], return_inverse=True)
         levels, origin, scale = pyramids(maps, searched, _SIGMA_M)
-        best_poses(
-            levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
-            np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
-            _TURN_STEP, _LEAST, starts, scores,
-        )  # fmt: skip
+        with parallel_chunksize(1):  # some searches take a hundred times as long as others
+            best_poses(
+                levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
+                np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
+                _TURN_STEP, _LEAST, starts, scores,
+            )  # fmt: skip
         hit = some[scores > 0.0]
         again = np.empty((len(hit), 3)), np.empty((len(hit), 3, 3)), np.zeros(len(hit))
         _refine(maps, which[hit], clouds[hit], lengths[hit], starts[scores > 0.0], *again)

@@ -23,7 +23,7 @@ def compose(poses: Floats, motions: Floats) -> Floats:
     cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
     x = poses[..., 0] + cosine * motions[..., 0] - sine * motions[..., 1]
     y = poses[..., 1] + sine * motions[..., 0] + cosine * motions[..., 1]
-    return np.stack([x, y, wrapped(poses[..., 2] + motions[..., 2])], axis=-1)
+    return _rows(x, y, wrapped(poses[..., 2] + motions[..., 2]))
 
 
 def between(poses: Floats, others: Floats) -> Floats:
@@ -31,7 +31,14 @@ def between(poses: Floats, others: Floats) -> Floats:
     cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
     dx, dy = others[..., 0] - poses[..., 0], others[..., 1] - poses[..., 1]
     turn = wrapped(others[..., 2] - poses[..., 2])
-    return np.stack([cosine * dx + sine * dy, cosine * dy - sine * dx, turn], axis=-1)
+    return _rows(cosine * dx + sine * dy, cosine * dy - sine * dx, turn)
+
+
+def _rows(x: Floats, y: Floats, turn: Floats) -> Floats:
+    """(..., 3); several times as fast as `numpy.stack` of a few."""
+    found = np.empty((*np.shape(x), 3))
+    found[..., 0], found[..., 1], found[..., 2] = x, y, turn
+    return found
 
 
 def inverse(poses: Floats) -> Floats:

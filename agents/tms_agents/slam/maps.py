@@ -87,10 +87,13 @@ def grown(tiles: Sequence[TiledMaps], frame: Floats, resolution: float, lowest: 
     """``frame`` after all ``tiles``, which share it, have grown with a margin until both corners (m) are inside."""
     span = SIDE * resolution
     height, width = tiles[0].directory.shape[1:]
+    if (
+        frame[0] <= lowest[0] and (highest[0] - frame[0]) / span <= width
+        and frame[1] <= lowest[1] and (highest[1] - frame[1]) / span <= height
+    ):  # fmt: skip
+        return frame
     below = np.ceil((frame[:2] - lowest) / span).astype(int)
     above = np.ceil((highest - frame[:2]) / span).astype(int) - np.array([width, height])
-    if (below <= 0).all() and (above <= 0).all():
-        return frame
     left, bottom = (int(b) + _MARGIN_TILES if b > 0 else 0 for b in below)
     right, top = (int(a) + _MARGIN_TILES if a > 0 else 0 for a in above)
     for each in tiles:

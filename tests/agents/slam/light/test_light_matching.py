@@ -10,9 +10,7 @@ from tms_agents.slam.light.closures import placed_by_light
 from tms_agents.slam.light.filtering import as_beams
 from tms_agents.slam.light.layer import LightMaps, light_at
 from tms_agents.slam.light.matching import match_light
-from tms_agents.slam.light.mending import step_by_light
 from tms_agents.slam.light.scans import LightScan
-from tms_agents.slam.settings import Settings
 
 ALONG = np.linspace(-3.0, 3.0, 401)
 #: Of the colours, at places a few decimetres long.
@@ -112,17 +110,3 @@ def test_a_revisit_with_other_colours_is_none():
     scan = wall(coloured=True, seed=3)
     other = np.interp(np.tile(ALONG, 2), np.linspace(-3, 3, 25), np.random.default_rng(9).uniform(-1.0, 0.6, 25))
     assert revisit(0.3, LightScan(scan.points, scan.tangents, other, scan.deviation)) is None
-
-
-@pytest.mark.parametrize("coloured", [True, False])
-def test_a_jump_along_the_corridor_is_taken_back_by_its_colours(coloured):
-    maps, _ = world(coloured)
-    before, after = wall(coloured=coloured), wall(coloured=coloured, seed=4)
-    cloud = np.ascontiguousarray(after.points[np.abs(after.points[:, 0]) < 2.0][::3])
-    jump, motion, precision = np.array([0.9, 0.0, 0.0]), np.array([0.04, 0.0, 0.0]), np.diag([600.0, 600.0, 2500.0])
-    found = step_by_light(maps, np.zeros((1, 3)), [before], cloud, after, jump, motion, precision, Settings())
-    if coloured:
-        assert found is not None
-        np.testing.assert_allclose(found, 0.0, atol=0.04)
-    else:
-        assert found is None
