@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Why a print is furniture: by its looks, or because a piece that has gone from nearby looks like it.
+LOOKS, MOVED = 1, 2
+#: The weight of either in the background: what only looks like it cannot turn up elsewhere as a piece, at first.
+ADOPTED = (0.0, 0.1, 0.3)
 #: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free, and so long if
 #: it is one piece. Its width is then the same within this (m) and as far as the beams tell.
 _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
@@ -19,12 +23,12 @@ _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 #: Its width is the same within this (m) and as far as the beams tell.
 _THIN_WIDTH_M = 0.01
-#: The legs of a chair that was moved stand still within so long (s).
-_TOGETHER_S = 2.0
+#: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
+_TOGETHER_S, _LEGS_M = 2.0, 0.2
 #: The ranges of one surface differ so little from beam to beam (m).
 _SAME_M = 0.05
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
-_GONE_S, _WEIGHT = 0.8, 0.12
+_GONE_S, _WEIGHT = 0.8, 0.25
 #: It cannot stand at its new place so long (s) before it is seen to have gone, unless who pushes it hides that.
 _EARLY_S = 2.0
 
@@ -91,13 +95,14 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
 
 def _legs(print_: Any, prints: Any) -> bool:
     """Whether the print and at least two others are thin, near each other, and stand there since the same time."""
-    if print_["width"] > _THIN_M or print_["given"] == 1:
-        # What was put down by somebody who stands beside it has not been pushed there.
+    if print_["width"] > _THIN_M or print_["given"] == 1 or print_["mutes"] > print_["hits"]:
+        # What was put down by somebody who stands beside it has not been pushed there; parts of what is black or
+        # glossy are no legs.
         return False
     away = np.hypot(prints["x"] - print_["x"], prints["y"] - print_["y"])
     thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)
     since = np.abs(prints["first"] - print_["first"])
-    legs = thin & (away > 0.08) & (away < _GROUP_M) & (since < np.where(prints["revealed"] == 2, 6.0, _TOGETHER_S))
+    legs = thin & (away > _LEGS_M) & (away < _GROUP_M) & (since < np.where(prints["revealed"] > 0, 6.0, _TOGETHER_S))
     return int(np.count_nonzero(legs)) >= 2
 
 

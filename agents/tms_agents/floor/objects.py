@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
-from tms_agents.floor.freespace import FREE, HIT, QUIET, SILENT
+from tms_agents.floor.freespace import FREE, HIDDEN, HIT, QUIET, SILENT
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -21,6 +21,8 @@ OBJECT, FURNITURE = 1, 2
 _ARM_M, _FAR_M = 0.5, 1.6
 #: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
 _SURE, _PER_SCAN = 7.5, 1.5
+#: While it is hidden, looks past the edge of what hides it (mixed pixels) are forgotten in this time (s).
+_FORGET_S = 2.0
 #: Things overlap if they are nearer than this share of their half widths (and m).
 _OVERLAP, _BESIDE_M = 0.6, 0.01
 #: Parts of what is black or glossy are so near each other (m).
@@ -46,6 +48,8 @@ _PARKS_S, _COVERED = 60.0, 0.8
 _ROBOTS_S = 120.0
 #: Nobody stands with the feet so far apart (m) for so long (s).
 _ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
+#: A foot stands at a wall or a piece of furniture for so long (s) at most.
+_LEANS_S = 6.0
 #: Surfaces lie this uncertain behind what is seen (m²).
 _SURFACE_VAR = 0.006**2
 
@@ -94,6 +98,10 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
             if thing.doubt < 4.0:
                 thing.rate -= 0.02 * thing.rate
                 thing.solid -= 0.02 * thing.solid
+        elif seen.verdict == HIDDEN:
+            fade = np.exp(-dt / _FORGET_S)
+            thing.free *= fade
+            thing.doubt *= fade
         if seen.verdict == HIT or seen.verdict == FREE:
             thing.free_at = t
         if thing.free > 0.0:
@@ -191,7 +199,7 @@ def _ripe(
         q = prints[j]
         ripe[j] = 0
         # What is not there now may be a foot that has just been lifted.
-        if not q.used or q.last < t or q.revealed == 2:
+        if not q.used or q.last < t or q.revealed:
             continue
         astride = q.owner >= 0 and _astride(q, prints, j, bodies, t)
         if q.owner >= 0 and not astride:
@@ -200,7 +208,7 @@ def _ripe(
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
         # What somebody put down may touch a wall.
-        if q.attached > 0.5 and q.given == 0:
+        if q.attached > 0.5 and q.given == 0 and (t - q.busy > alone_s or age > _LEANS_S):
             ripe[j] = FURNITURE
             count += 1
             continue

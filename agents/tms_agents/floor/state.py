@@ -101,6 +101,8 @@ BODY = np.dtype(
         ("stride", "f8"),
         ("side", "f8"),
         ("lone", "f8"),
+        ("lone_x", "f8"),
+        ("lone_y", "f8"),
         ("pushed", "f8"),
         ("quality", "f8"),
         ("single", "f8"),

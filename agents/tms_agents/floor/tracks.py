@@ -26,6 +26,8 @@ _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 _LONE_S = 4.0
 #: Where the other foot was last seen, within this (m), and it may be hidden, time counts by this share.
 _BEHIND, _STEP_M = 0.2, 0.1
+#: What had stood there for so long (s) before somebody's only foot came there is most likely a thing: time counts more.
+_OLDER_S, _FASTER = 1.0, 2.5
 #: Nobody stands for so long (s) without shifting a foot.
 _STILL_S = 40.0
 #: What was pushed stands still for so long (s): it is furniture.
@@ -148,13 +150,24 @@ def _review(
                 actions[b] = _CONFIRM
             continue
         if unseen == 0.0:
-            if not _is_lone(body, t):
-                body.lone = 0.0
-            else:
-                unseen_b = body.a_seen >= body.b_seen
-                x, y, at = (body.bx, body.by, body.b_seen) if unseen_b else (body.ax, body.ay, body.a_seen)
+            only_a = body.a_seen >= body.b_seen
+            foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
+            if _is_lone(body, t):
+                x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
                 behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
-                body.lone += dt * (_BEHIND if behind else 1.0)
+                if body.lone == 0.0:
+                    body.lone_x, body.lone_y = foot_x, foot_y
+                stood, landed = (body.a_since, body.a_land) if only_a else (body.b_since, body.b_land)
+                if landed > stood + _OLDER_S:
+                    body.lone += dt * _FASTER
+                else:
+                    body.lone += dt * (_BEHIND if behind else 1.0)
+            elif (
+                max(t - body.a_seen, t - body.b_seen) < 1.0
+                or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
+            ):
+                # What was hidden meanwhile goes on being alone.
+                body.lone = 0.0
             single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
             body.single = body.single + dt if single else 0.0
             if body.lone > _LONE_S or misled(body):
