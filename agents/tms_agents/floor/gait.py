@@ -65,8 +65,8 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
     if swings:
         return
     elsewhere = _ROLL_M if body.shoe >= SHOES else _STANCE_M
-    elsewhere_or_long = np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0
-    if elsewhere_or_long and not stays:
+    anew = np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0
+    if anew and not stays:
         beat(body, body.a_stood - body.a_land, since - body.a_stood)
         body.a_ox, body.a_oy = body.a_px, body.a_py
         body.a_px, body.a_py = c.x, c.y

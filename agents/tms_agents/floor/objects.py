@@ -40,8 +40,12 @@ _MUTES, _SELDOM = 10, 0.06
 #: Somebody lost sight of so near (m) may still stand there for so long (s), on two feet so near each other (m) that are
 #: seen again at the same time (within s).
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
+#: The same of somebody of whom one thing alone was seen that did not move.
+_NOWHERE_S = 8.0
 #: No foot looks narrower (m).
 _FOOT_M = 0.06
+#: Whoever is there, what is so broad (m) is furniture, where there are no robots.
+_BROAD_M = 0.45
 #: Robots stand for so long (s); what stands behind something is seen in part in this share of its sightings.
 _PARKS_S, _COVERED = 60.0, 0.8
 #: A robot that was here so long ago (s) may still be.
@@ -119,13 +123,13 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
         return True
     if t - q.first > _STANDS_S or q.given:
         return False
-    lost = False
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
-            lost = True
-    if lost and q.whole < 0.5 * q.hits:
-        return True
+            # Who was found to be nowhere but on this is hardly there.
+            nowhere = max(body.a_seen, body.b_seen) < 0.0 and t - q.first > _NOWHERE_S
+            if q.whole < 0.5 * q.hits and not nowhere:
+                return True
     if q.width < _FOOT_M:
         return False
     for o in range(prints.size):
@@ -212,9 +216,10 @@ def _ripe(
             ripe[j] = FURNITURE
             count += 1
             continue
-        if q.spread > 0.03 or not _plain(q, t, rest_s):
+        broad = q.width > _BROAD_M and not robots
+        if q.spread > (0.05 if broad else 0.03) or not _plain(q, t, rest_s):
             continue
-        alone = t - q.busy > alone_s
+        alone = t - q.busy > alone_s or broad
         given = q.given == 1 and age > 1.25 * rest_s
         nobodys = alone or given or astride or q.spare >= _SPARE_S
         if not nobodys and (t - q.owned < alone_s or not _third(q, bodies, t, rest_s)):
