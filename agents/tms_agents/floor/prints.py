@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 #: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
 _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
-#: What comes out again so near (m, and per metre of range) and as wide (share, m) as it was is the same: no foot steps
-#: so exactly.
-_SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 0.02, 0.003, 0.25, 0.015
+#: What had rested for so long (s) and comes out again so near (m, and per metre of range) and as wide (share, m) as it
+#: was is the same: no foot steps so exactly.
+_RESTED_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.02, 0.003, 0.25, 0.015
 #: So many times more often seen than seen whole.
 _HARDLY = 8
 #: What is black or glossy echoes now and then: at least once in this time (s).
@@ -34,7 +34,7 @@ def _same(q: Any, c: Any) -> bool:
     """Whether the cluster is what was at the print before something else hid it."""
     if np.hypot(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (0.25 * q.width if c.cut else 0.0):
         return False
-    return bool(q.hits >= 3 and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
+    return bool(q.last - q.first > _RESTED_S and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
 
 
 @njit(cache=True)

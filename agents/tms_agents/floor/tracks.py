@@ -36,6 +36,8 @@ _PARKED_S = 5.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
+#: What moved with people beside it for this share of its way may have been pushed.
+_BESIDE = 0.15
 #: Who stays within this (m) rests.
 _REST_M = 0.15
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run.
@@ -85,6 +87,9 @@ def _is_parked(body: Any, t: float) -> bool:
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
         return bool(t - since > _PARKED_S)
+    if body.pushed < _BESIDE:
+        # It came by itself.
+        return False
     # Furniture half hidden by who pushes it: as broad as no leg or shoe, or broad once and hardly ever on two feet.
     rests = t - body.rest_at
     broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
