@@ -101,7 +101,7 @@ def _legs(print_: Any, prints: Any) -> bool:
         return False
     away = np.hypot(prints["x"] - print_["x"], prints["y"] - print_["y"])
     thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)
-    since = np.abs(prints["first"] - print_["first"])
+    since = np.abs(prints["rested"] - print_["rested"])
     legs = thin & (away > _LEGS_M) & (away < _GROUP_M) & (since < np.where(prints["revealed"] > 0, 6.0, _TOGETHER_S))
     return int(np.count_nonzero(legs)) >= 2
 
@@ -129,14 +129,14 @@ class Furniture:
             return True
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
-        near = [p for p in near if print_["first"] - p.t + _GONE_S > -_EARLY_S]
+        near = [p for p in near if print_["rested"] - p.t + _GONE_S > -_EARLY_S]
         best, best_cost = None, 1.0
         width, spacing = float(print_["width"]), float(print_["spacing"])
         for piece in near:
             if any(math.hypot(piece.x - x, piece.y - y) < 0.05 for _, x, y in self._found):
                 continue
             thin = width < _THIN_M
-            if print_["first"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
+            if print_["rested"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
                 thin and not self._grouped(piece, pieces)
             ):
                 continue

@@ -49,7 +49,7 @@ def swap(body: Any) -> None:
 def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) -> None:
     """The first foot was seen ``late`` s into the sweep that began at t: it stands, has landed, or swings."""
     since = prints[c_print].first if c_print >= 0 else t
-    stays = c_print >= 0 and c_print == body.a_print and since <= body.a_stood
+    stays = c_print >= 0 and c_print == body.a_print and prints[c_print].rested <= body.a_stood
     dt = t - body.a_seen
     body.a_vx, body.a_vy = 0.0, 0.0
     swings = False

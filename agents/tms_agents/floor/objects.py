@@ -152,9 +152,8 @@ def _astride(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
 
 
 @njit(cache=True)
-def _plain(q: Any, t: float, rest_s: float) -> bool:
-    """Whether enough has been seen of the print: so many beams, so often, and all of it."""
-    age = t - q.first
+def _plain(q: Any, age: float, t: float, rest_s: float) -> bool:
+    """Whether enough has been seen of the print, ``age`` s old: so many beams, so often, and all of it."""
     # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
     # What is silent most of the time shows less of itself.
     seldom = t - q.silent < 1.0 and q.mutes >= _MUTES and q.hits > _SELDOM * (q.looks + q.mutes)
@@ -208,7 +207,7 @@ def _ripe(
         astride = q.owner >= 0 and _astride(q, prints, j, bodies, t)
         if q.owner >= 0 and not astride:
             continue
-        age = t - q.first
+        age = t - (q.first if robots else q.rested)
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
         # What somebody put down may touch a wall.
@@ -217,7 +216,7 @@ def _ripe(
             count += 1
             continue
         broad = q.width > _BROAD_M and not robots
-        if q.spread > (0.05 if broad else 0.03) or not _plain(q, t, rest_s):
+        if q.spread > (0.05 if broad else 0.03) or not _plain(q, age, t, rest_s):
             continue
         alone = t - q.busy > alone_s or broad
         given = q.given == 1 and age > 1.25 * rest_s
@@ -285,7 +284,7 @@ class Objects:
         thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
-        thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["first"], t, 0.0, 0.0, t
+        thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["rested"], t, 0.0, 0.0, t
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
         thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))

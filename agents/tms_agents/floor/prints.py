@@ -34,7 +34,7 @@ def _same(q: Any, c: Any) -> bool:
     """Whether the cluster is what was at the print before something else hid it."""
     if np.hypot(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (0.25 * q.width if c.cut else 0.0):
         return False
-    return bool(q.last - q.first > _RESTED_S and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
+    return bool(q.last - q.rested > _RESTED_S and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
 
 
 @njit(cache=True)
@@ -91,7 +91,7 @@ def follow(
             of[k] = j
             taken[j] = True
             q = prints[j]
-            q.used, q.first, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, 0, 0, 0, 0, 0
+            q.used, q.first, q.rested, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, t, 0, 0, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
@@ -100,12 +100,16 @@ def follow(
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
-            q.first, q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = t, 0, 0, 0, 0, 0, 0.0
+            q.first, q.rested = t, t
+            q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
             q.revealed = 0
-        if t - max(q.last, q.silent) > _GONE_S and not _same(q, c):
-            # Somebody else may stand there now.
-            q.first, q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = t, 0, 0, 0, 0, 0, 0.0
+        if t - max(q.last, q.silent) > _GONE_S and _same(q, c):
+            # Somebody may stand there now, but if it is nobody's it has been there all the time.
+            q.first = t
+        elif t - max(q.last, q.silent) > _GONE_S:
+            q.first, q.rested = t, t
+            q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
         q.hits += 1
         q.looks += 1
         q.last = t
@@ -154,6 +158,10 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
         body.still = 0.0
         if body.used and body.a_print >= 0 and body.b_print >= 0 and max(t - body.a_seen, t - body.b_seen) < 0.5:
             body.still = t - max(prints[body.a_print].still, prints[body.b_print].still)
+        body.older = 0.0
+        j, land = (body.a_print, body.a_land) if body.a_seen >= body.b_seen else (body.b_print, body.b_land)
+        if body.used and j >= 0:
+            body.older = land - prints[j].rested
     for j in range(prints.size):
         q = prints[j]
         if not q.used:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 #: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
-#: (x, y) m mean of where it was seen, first and last time seen, hits, looks and mutes (scans
+#: (x, y) m mean of where it was seen, first (since it was hidden), rested (ever since) and last time seen, hits, looks and mutes (scans
 #: since that hit it, that could have, that saw nothing at all there; of those that hit it, that saw all of it, and only
 #: what something new before it left), width m, spread m (mean
 #: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), freed (when a body was last
@@ -20,6 +20,7 @@ PRINT = np.dtype(
         ("x", "f8"),
         ("y", "f8"),
         ("first", "f8"),
+        ("rested", "f8"),
         ("last", "f8"),
         ("hits", "i8"),
         ("looks", "i8"),
@@ -103,6 +104,7 @@ BODY = np.dtype(
         ("lone", "f8"),
         ("lone_x", "f8"),
         ("lone_y", "f8"),
+        ("older", "f8"),
         ("rest_x", "f8"),
         ("rest_y", "f8"),
         ("rest_at", "f8"),

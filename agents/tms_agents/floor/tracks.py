@@ -185,8 +185,7 @@ def _review(
                 behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
                 if body.lone == 0.0:
                     body.lone_x, body.lone_y = foot_x, foot_y
-                stood, landed = (body.a_since, body.a_land) if only_a else (body.b_since, body.b_land)
-                if landed > stood + _OLDER_S:
+                if body.older > _OLDER_S:
                     body.lone += dt * _FASTER
                 else:
                     body.lone += dt * (_BEHIND if behind else 1.0)
