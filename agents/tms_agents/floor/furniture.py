@@ -137,7 +137,7 @@ class Furniture:
                 continue
             thin = width < _THIN_M
             if print_["rested"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
-                thin and not self._grouped(piece, pieces)
+                thin and not self._grouped(piece, pieces, _THIN_M + spacing)
             ):
                 continue
             least = _THIN_WIDTH_M if thin else _WIDTH_M
@@ -163,9 +163,10 @@ class Furniture:
         )
 
     @staticmethod
-    def _grouped(piece: Piece, pieces: list[Piece]) -> bool:
-        return any(
+    def _grouped(piece: Piece, pieces: list[Piece], thin: float) -> bool:
+        return piece.width < thin and any(
             other is not piece
+            and other.width < thin
             and 0.06 < math.hypot(other.x - piece.x, other.y - piece.y) < _GROUP_M
             and abs(other.t - piece.t) < _GROUP_S
             for other in pieces
