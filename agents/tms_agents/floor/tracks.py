@@ -38,6 +38,8 @@ _PARKED_S = 5.0
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
 #: What moved with people beside it for this share of its way may have been pushed.
 _BESIDE = 0.15
+#: What began as a piece of furniture and is still so broad (m) in the mean is one.
+_PIECE_M = 0.25
 #: Who stays within this (m) rests.
 _REST_M = 0.15
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run.
@@ -87,13 +89,19 @@ def _is_parked(body: Any, t: float) -> bool:
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
         return bool(t - since > _PARKED_S)
-    if body.pushed < _BESIDE:
+    if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
         # It came by itself.
         return False
     # Furniture half hidden by who pushes it: as broad as no leg or shoe, or broad once and hardly ever on two feet.
     rests = t - body.rest_at
     broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
     return bool((broad and rests > _PARKED_S) or (_is_footless(body) and rests > 2.0 * _PARKED_S))
+
+
+@njit(cache=True)
+def _is_known(body: Any) -> bool:
+    """Whether two feet have been seen so often that it is a person."""
+    return bool(body.hits > _KNOWN and body.both > _FEET * body.hits)
 
 
 @njit(cache=True)
@@ -142,10 +150,13 @@ def _review(
         unseen = t - body.seen
         if (body.wide > 0.3 or body.far > _FAR_M) and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
+        if unseen == 0.0 and np.hypot(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
+            body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
         if not body.confirmed:
             way = np.hypot(body.x - body.x0, body.y - body.y0)
             age = body.seen - body.first
-            if unseen > 0.45 or (age > 3.0 and way < 0.15) or body.hits < 0.5 * body.looks - 1.0:
+            parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
+            if unseen > 0.45 or (age > 3.0 and way < 0.15) or parked or body.hits < 0.5 * body.looks - 1.0:
                 body.used = 0
                 continue
             if unseen > 0.0:
@@ -176,8 +187,6 @@ def _review(
                 actions[b] = _CONFIRM
             continue
         if unseen == 0.0:
-            if np.hypot(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
-                body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
             only_a = body.a_seen >= body.b_seen
             foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
             if _is_lone(body, t):
@@ -202,7 +211,7 @@ def _review(
                 actions[b] = _LOST
             elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
                 # Somebody who is known for long has gone on from there.
-                actions[b] = _LOST if body.hits > _KNOWN and body.both > _FEET * body.hits else _GONE
+                actions[b] = _LOST if _is_known(body) else _GONE
             elif body.stale:
                 actions[b] = _BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
@@ -374,7 +383,7 @@ class Tracks:
         self, index: int, t: float, new_label: Callable[[], int], was_furniture: Callable[[Any], bool]
     ) -> list[FloorEvent]:
         body = self.bodies[index]
-        if body["from_furniture"] == 1 and body["wide"] > 0.3:
+        if body["from_furniture"] == 1 and (body["wide"] > 0.3 or body["width"] > _PIECE_M):
             # Nothing is pushed so far; it goes by itself.
             way = math.hypot(body["x"] - body["x0"], body["y"] - body["y0"])
             if way < _PUSHED_M or body["pushed"] > 0.4:
