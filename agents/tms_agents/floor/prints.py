@@ -17,6 +17,8 @@ _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
 #: What had rested for so long (s) and comes out again so near (m, and per metre of range) and as wide (share, m) as it
 #: was is the same: no foot steps so exactly.
 _RESTED_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.02, 0.003, 0.25, 0.015
+#: No foot is so wide (m).
+_WIDE_M = 0.3
 #: So many times more often seen than seen whole.
 _HARDLY = 8
 #: What is black or glossy echoes now and then: at least once in this time (s).
@@ -105,8 +107,9 @@ def follow(
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
             q.revealed = 0
         if t - max(q.last, q.silent) > _GONE_S and _same(q, c):
-            # Somebody may stand there now, but if it is nobody's it has been there all the time.
-            q.first = t
+            # Somebody may stand there now, but if it is nobody's foot it has been there all the time.
+            if q.width < _WIDE_M:
+                q.first = t
         elif t - max(q.last, q.silent) > _GONE_S:
             q.first, q.rested = t, t
             q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
