@@ -54,6 +54,8 @@ _ROBOTS_S = 120.0
 _ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
 #: A foot stands at a wall or a piece of furniture for so long (s) at most.
 _LEANS_S = 6.0
+#: What joins it may be a thing while who stands or drives beside both has not gone, for so long (s).
+_JOINED_S = 3.0
 #: Surfaces lie this uncertain behind what is seen (m²).
 _SURFACE_VAR = 0.006**2
 
@@ -211,9 +213,11 @@ def _ripe(
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
         # What somebody put down may touch a wall.
-        if q.attached > 0.5 and q.given == 0 and (t - q.busy > alone_s or age > _LEANS_S):
-            ripe[j] = FURNITURE
-            count += 1
+        leans = age > (_LEANS_S if t - q.busy < alone_s else _JOINED_S if q.width < width_m else 0.0)
+        if q.attached > 0.5 and q.given == 0:
+            if leans:
+                ripe[j] = FURNITURE
+                count += 1
             continue
         broad = q.width > _BROAD_M and not robots
         if q.spread > (0.05 if broad else 0.03) or not _plain(q, age, t, rest_s):
