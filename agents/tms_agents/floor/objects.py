@@ -223,7 +223,7 @@ def _ripe(
         if q.spread > (0.05 if broad else 0.03) or not _plain(q, age, t, rest_s):
             continue
         alone = t - q.busy > alone_s or broad
-        given = q.given == 1 and age > 1.25 * rest_s
+        given = q.given == 1 and age > (_PART_S if robots else 1.25 * rest_s)
         nobodys = alone or given or astride or q.spare >= _SPARE_S
         if not nobodys and (t - q.owned < alone_s or not _third(q, bodies, t, rest_s)):
             continue
