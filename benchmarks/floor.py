@@ -19,16 +19,18 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from floor_contestants import CONTESTANTS, Contestant, Feet
+from floor_contestants import CONTESTANTS, Contestant
 from floor_scores import Scores, score
 from floor_speed import memory, speed
 from floor_tables import movers_table, objects_table, requirements_table, static_table
 
 from tms_agents.devices.scans import Sweep
 from tms_agents.simulation.floor_world import UNSEEN, FloorWorld
+
+Feet = Literal["legs", "prints"]
 
 TUNING_SEEDS, UNSEEN_SEEDS = range(1, 6), range(UNSEEN, UNSEEN + 5)
 MOVER_SCENES = ("one", "three", "three close", "eight", "start", "bed", "robots", "two lasers", "mirror", "misplaced")
@@ -129,7 +131,7 @@ def judged(job: Job) -> Outcome:
     """Play one world to one contestant."""
     world = FloorWorld(job.scene, job.seed, feet="legs" if job.feet == "legs" else "prints", duration=job.duration)
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
-    contestant = CONTESTANTS[job.contestant](sensors, world.known(), "auto")
+    contestant = CONTESTANTS[job.contestant](sensors, world.known())
     scans = ((f.sensor, f.t, f.ranges, f.intensities) for f in world.scans())
     prediction, late_events = told(contestant, scans)
     late = {one["id"] for frame in prediction if frame["t"] > 30 for one in frame["labels"]}
@@ -203,7 +205,7 @@ def _sample(folder: Path, truth: dict[str, Any], name: str) -> list[dict[str, An
             sensors[one["name"]] = (sweep, tuple(data["sensor_pose"]))
             ranges = data["ranges"].astype(float)
             scans += [(one["name"], float(t), row, None) for t, row in zip(data["t"], ranges, strict=True)]
-    contestant = CONTESTANTS[name](sensors, None, "auto")
+    contestant = CONTESTANTS[name](sensors)
     return told(contestant, sorted(scans, key=lambda scan: scan[1]))[0]
 
 

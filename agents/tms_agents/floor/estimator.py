@@ -32,8 +32,8 @@ _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
 #: In a door somebody may wait for so long (s).
 _WAITS_S = 25.0
-#: Of saved states; 2: all hypotheses, and how brightness scatters.
-_FORMAT = 2
+#: Of saved states; 3: where feet were alone and bodies rested.
+_FORMAT = 3
 
 
 class FloorEstimator:
