@@ -4,6 +4,7 @@
     python benchmarks/floor.py --quick             the same with two seeds of each kind and a short hour
     python benchmarks/floor.py --only movers       or objects, static, samples, speed, memory
     python benchmarks/floor.py --seeds unseen      or tuning; both by default
+    python benchmarks/floor.py --first 1070        other unseen seeds: five from there on
     python benchmarks/floor.py --look "three" --seed 3 --feet prints     one world in numbers
 
 Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz. Seeds below 1000 were there to tune on,
@@ -32,7 +33,7 @@ from tms_agents.simulation.floor_world import UNSEEN, FloorWorld
 
 Feet = Literal["legs", "prints"]
 
-TUNING_SEEDS, UNSEEN_SEEDS = range(1, 6), range(UNSEEN, UNSEEN + 5)
+TUNING_SEEDS = range(1, 6)
 MOVER_SCENES = ("one", "three", "three close", "eight", "start", "bed", "robots", "two lasers", "mirror", "misplaced")
 OBJECT_SCENES = ("things", "near wall", "glossy", "hidden", "furniture", "robots", "two lasers", "mirror", "misplaced")
 SCENES = tuple(dict.fromkeys(MOVER_SCENES + OBJECT_SCENES))
@@ -63,6 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--quick", action="store_true", help="fewer seeds")
     parser.add_argument("--only", choices=("movers", "objects", "static", "samples", "speed", "memory"))
     parser.add_argument("--seeds", choices=("tuning", "unseen", "both"), default="both")
+    parser.add_argument("--first", type=int, default=UNSEEN, help="first of the unseen seeds")
     parser.add_argument("--contestants", default="ours,laboratory", help="comma separated")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--hours", type=float, help="simulated hours of --only memory and static, 24 and 1 by default")
@@ -80,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             return
         except ValueError as error:
             parser.error(str(error))
-    seeds = {"tuning": TUNING_SEEDS, "unseen": UNSEEN_SEEDS}
+    seeds = {"tuning": TUNING_SEEDS, "unseen": range(args.first, args.first + 5)}
     seeds = {name: found[:2] if args.quick else found for name, found in seeds.items() if args.seeds in (name, "both")}
     with ProcessPoolExecutor(args.jobs) as pool:
         if args.only in (None, "movers", "objects"):
