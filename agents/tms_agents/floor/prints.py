@@ -17,6 +17,8 @@ _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
 #: What had rested for so long (s) and comes out again so near (m, and per metre of range) and as wide (share, m) as it
 #: was is the same: no foot steps so exactly.
 _RESTED_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.02, 0.003, 0.25, 0.015
+#: What has been seen for so long (s) is not a foot of somebody whom one lost sight of before.
+_NOT_HIS_S = 1.0
 #: No foot is so wide (m).
 _WIDE_M = 0.3
 #: So many times more often seen than seen whole.
@@ -179,6 +181,10 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
             body = bodies[b]
             if not body.used:
                 continue
+            if body.stale and q.last == t and t - q.first > _NOT_HIS_S:
+                # What has been seen there for a while is no foot of one who is not seen.
+                body.a_print = -1 if body.a_print == j else body.a_print
+                body.b_print = -1 if body.b_print == j else body.b_print
             if not body.confirmed:
                 # Somebody who is not believed yet, but has walked.
                 walked = np.hypot(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3
