@@ -17,6 +17,8 @@ _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
 #: What had rested for so long (s) and comes out again so near (m, and per metre of range) and as wide (share, m) as it
 #: was is the same: no foot steps so exactly.
 _RESTED_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.02, 0.003, 0.25, 0.015
+#: What fewer beams meet flickers at the edge of something.
+_SPECK = 1.5
 #: What has been seen for so long (s) is not a foot of somebody whom one lost sight of before.
 _NOT_HIS_S = 1.0
 #: No foot is so wide (m).
@@ -36,7 +38,9 @@ _WALKED_M = 0.15
 @njit(cache=True)
 def _same(q: Any, c: Any) -> bool:
     """Whether the cluster is what was at the print before something else hid it."""
-    if np.hypot(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (0.25 * q.width if c.cut else 0.0):
+    if q.beams < _SPECK or np.hypot(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (
+        0.25 * q.width if c.cut else 0.0
+    ):
         return False
     return bool(q.last - q.rested > _RESTED_S and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
 
