@@ -4,6 +4,7 @@
     python benchmarks/floor.py --quick             the same with two seeds of each kind and a short hour
     python benchmarks/floor.py --only movers       or objects, static, samples, speed, memory
     python benchmarks/floor.py --seeds unseen      or tuning; both by default
+    python benchmarks/floor.py --first 1070        other unseen seeds: five from there on
     python benchmarks/floor.py --look "three" --seed 3 --feet prints     one world in numbers
 
 Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz. Seeds below 1000 were there to tune on,
@@ -19,10 +20,10 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from floor_contestants import CONTESTANTS, Contestant, Feet
+from floor_contestants import CONTESTANTS, Contestant
 from floor_scores import Scores, score
 from floor_speed import memory, speed
 from floor_tables import movers_table, objects_table, requirements_table, static_table
@@ -30,7 +31,9 @@ from floor_tables import movers_table, objects_table, requirements_table, static
 from tms_agents.devices.scans import Sweep
 from tms_agents.simulation.floor_world import UNSEEN, FloorWorld
 
-TUNING_SEEDS, UNSEEN_SEEDS = range(1, 6), range(UNSEEN, UNSEEN + 5)
+Feet = Literal["legs", "prints"]
+
+TUNING_SEEDS = range(1, 6)
 MOVER_SCENES = ("one", "three", "three close", "eight", "start", "bed", "robots", "two lasers", "mirror", "misplaced")
 OBJECT_SCENES = ("things", "near wall", "glossy", "hidden", "furniture", "robots", "two lasers", "mirror", "misplaced")
 SCENES = tuple(dict.fromkeys(MOVER_SCENES + OBJECT_SCENES))
@@ -61,6 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--quick", action="store_true", help="fewer seeds")
     parser.add_argument("--only", choices=("movers", "objects", "static", "samples", "speed", "memory"))
     parser.add_argument("--seeds", choices=("tuning", "unseen", "both"), default="both")
+    parser.add_argument("--first", type=int, default=UNSEEN, help="first of the unseen seeds")
     parser.add_argument("--contestants", default="ours,laboratory", help="comma separated")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--hours", type=float, help="simulated hours of --only memory and static, 24 and 1 by default")
@@ -78,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             return
         except ValueError as error:
             parser.error(str(error))
-    seeds = {"tuning": TUNING_SEEDS, "unseen": UNSEEN_SEEDS}
+    seeds = {"tuning": TUNING_SEEDS, "unseen": range(args.first, args.first + 5)}
     seeds = {name: found[:2] if args.quick else found for name, found in seeds.items() if args.seeds in (name, "both")}
     with ProcessPoolExecutor(args.jobs) as pool:
         if args.only in (None, "movers", "objects"):
@@ -129,7 +133,7 @@ def judged(job: Job) -> Outcome:
     """Play one world to one contestant."""
     world = FloorWorld(job.scene, job.seed, feet="legs" if job.feet == "legs" else "prints", duration=job.duration)
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
-    contestant = CONTESTANTS[job.contestant](sensors, world.known(), "auto")
+    contestant = CONTESTANTS[job.contestant](sensors, world.known())
     scans = ((f.sensor, f.t, f.ranges, f.intensities) for f in world.scans())
     prediction, late_events = told(contestant, scans)
     late = {one["id"] for frame in prediction if frame["t"] > 30 for one in frame["labels"]}
@@ -203,7 +207,7 @@ def _sample(folder: Path, truth: dict[str, Any], name: str) -> list[dict[str, An
             sensors[one["name"]] = (sweep, tuple(data["sensor_pose"]))
             ranges = data["ranges"].astype(float)
             scans += [(one["name"], float(t), row, None) for t, row in zip(data["t"], ranges, strict=True)]
-    contestant = CONTESTANTS[name](sensors, None, "auto")
+    contestant = CONTESTANTS[name](sensors)
     return told(contestant, sorted(scans, key=lambda scan: scan[1]))[0]
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from floor_laboratory import LaboratoryFloor
 from numpy.typing import NDArray
 
 from tms_agents.devices.scans import Sweep
-from tms_agents.floor import FloorEstimator, FloorSettings, Scene, Sensor
+from tms_agents.floor import FloorEstimator, Scene, Sensor
 from tms_agents.simulation.floor_world import Known
 
 Floats = NDArray[np.float64]
 Pose = tuple[float, float, float]
-Feet = Literal["legs", "prints", "auto"]
 
 
 class Contestant(Protocol):
@@ -27,7 +26,7 @@ class Contestant(Protocol):
 class Ours:
     """The estimator as an installer would set it up: poses as reported, the plan of the room."""
 
-    def __init__(self, sensors: dict[str, tuple[Sweep, Pose]], known: Known | None = None, feet: Feet = "auto") -> None:
+    def __init__(self, sensors: dict[str, tuple[Sweep, Pose]], known: Known | None = None) -> None:
         scene = Scene()
         if known is not None:
             scene = Scene(
@@ -38,7 +37,7 @@ class Ours:
                 robots=known.robots,
             )
         mounted = {name: Sensor(sweep, pose) for name, (sweep, pose) in sensors.items()}
-        self.estimator = FloorEstimator(mounted, FloorSettings(feet=feet), scene)
+        self.estimator = FloorEstimator(mounted, scene=scene)
 
     def scan(self, sensor: str, t: float, ranges: Floats, intensities: Floats | None = None) -> int:
         return len(self.estimator.scan(sensor, t, ranges, intensities))
@@ -50,7 +49,7 @@ class Ours:
 class Laboratory:
     """The published algorithm, one for each laser; it knows nothing of the room."""
 
-    def __init__(self, sensors: dict[str, tuple[Sweep, Pose]], known: Known | None = None, feet: Feet = "auto") -> None:
+    def __init__(self, sensors: dict[str, tuple[Sweep, Pose]], known: Known | None = None) -> None:
         self._floors = {name: LaboratoryFloor(sweep.angles, pose) for name, (sweep, pose) in sensors.items()}
 
     def scan(self, sensor: str, t: float, ranges: Floats, intensities: Floats | None = None) -> int:

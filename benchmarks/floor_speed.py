@@ -61,7 +61,7 @@ def _row(title: str, cost_ms: Sequence[float], labels: str) -> None:
 
 def _contestant(name: str, world: FloorWorld) -> Contestant:
     sensors = {key: (mount.laser.sweep(), mount.reported) for key, mount in world.sensors.items()}
-    return CONTESTANTS[name](sensors, world.known(), "auto")
+    return CONTESTANTS[name](sensors, world.known())
 
 
 def _detections(truth: dict[str, Any], things: bool) -> list[Floats]:

@@ -96,7 +96,7 @@ def test_the_agent_of_the_laser_is_told_what_is_so(tmp_path: Path) -> None:
         configs = install(tmp_path, hardware, "http://127.0.0.1:1", "demo")
         config = read_config(configs[FLOOR_AGENT], FloorConfig)
         assert hardware.plugs[FLOOR_AGENT].laser == (config.lasers[0].source.host, config.lasers[0].source.port)
-    assert config.lasers[0].pose.pose == LASER_POSE and config.feet == "legs"
+    assert config.lasers[0].pose.pose == LASER_POSE
     assert len(config.room_scene().seats) == len(config.room_scene().masks) == len(config.room_scene().robots) == 1
     with plugged_in(0) as hardware:
         assert FLOOR_AGENT not in install(tmp_path, hardware, "http://127.0.0.1:1", "demo")

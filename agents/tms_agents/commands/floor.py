@@ -53,7 +53,6 @@ def _of_recordings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pose", action="append", metavar="X,Y,THETA", help="of each sensor, in the order of the files"
     )
-    parser.add_argument("--feet", choices=("legs", "prints", "auto"), help="what a person looks like (default auto)")
 
 
 def _calibrate(parser: argparse.ArgumentParser) -> None:

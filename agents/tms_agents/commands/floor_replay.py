@@ -55,8 +55,6 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
             raise CommandError(f"--pose is given {len(given)} times, there are {len(recordings)} sensors: {names}")
         recordings = [changed(one, pose=pose) for one, pose in zip(recordings, given, strict=True)]
     config = config_of(recordings, like)
-    if arguments.feet is not None:
-        config = config.model_copy(update={"feet": arguments.feet})
     return config, recordings
 
 

@@ -97,6 +97,8 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.a_px, body.a_py, body.a_ox, body.a_oy, body.a_land, body.a_stood = c.x, c.y, 1e9, 1e9, t, t
     body.b_px, body.b_py, body.b_ox, body.b_oy, body.b_land, body.b_stood = 1e9, 1e9, 1e9, 1e9, -1e9, -1e9
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
+    body.lone_x, body.lone_y = c.x, c.y
+    body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
     body.shoe = 0.0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0

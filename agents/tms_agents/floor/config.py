@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
 
@@ -92,8 +92,6 @@ class FloorConfig(AgentConfig):
     lasers: Annotated[list[LaserSection], Field(min_length=1, max_length=16)]
     scene: SceneSection = SceneSection()
     robots: Annotated[list[RobotSection], Field(max_length=16)] = []
-    #: What a person looks like: ``legs`` at the height of ankles, ``prints`` where a shoe is seen only while it stands.
-    feet: Literal["legs", "prints", "auto"] = "auto"
     estimator: dict[str, float] = {}
     #: A mover's place is told after this way or this time, whichever is first, and where it came to rest.
     report_m: Annotated[float, Field(ge=0.02, le=10)] = 0.25
@@ -129,7 +127,7 @@ class FloorConfig(AgentConfig):
 
     def settings(self) -> FloorSettings:
         tuned = _Settings.model_validate(self.estimator).model_dump(exclude_unset=True)
-        return FloorSettings(feet=self.feet, **tuned)
+        return FloorSettings(**tuned)
 
     @property
     def tells_robots(self) -> bool:
@@ -143,11 +141,7 @@ class FloorConfig(AgentConfig):
 _Settings: type[Section] = create_model(  # type: ignore[call-overload]
     "_Settings",
     __base__=Section,
-    **{
-        one.name: (Annotated[float, Field(gt=0)], getattr(FloorSettings(), one.name))
-        for one in fields(FloorSettings)
-        if one.name != "feet"
-    },
+    **{one.name: (Annotated[float, Field(gt=0)], getattr(FloorSettings(), one.name)) for one in fields(FloorSettings)},
 )
 
 

@@ -12,7 +12,7 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, guard, look
-from tms_agents.floor.furniture import Furniture, Piece
+from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects, candidates, near_movers
@@ -32,8 +32,8 @@ _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
 #: In a door somebody may wait for so long (s).
 _WAITS_S = 25.0
-#: Of saved states; 2: all hypotheses, and how brightness scatters.
-_FORMAT = 2
+#: Of saved states; 3: where feet were alone and bodies rested.
+_FORMAT = 3
 
 
 class FloorEstimator:
@@ -162,8 +162,11 @@ class FloorEstimator:
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s
-        if kind != OBJECT or known or self._furniture.explains(q, self._prints, self._pieces(t), t):
-            q["revealed"] = 2
+        if kind != OBJECT:
+            q["revealed"] = LOOKS
+            return []
+        if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
+            q["revealed"] = MOVED
             return []
         who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})
         events = self._objects.born(q, self._new_label(), who, t)
@@ -178,10 +181,10 @@ class FloorEstimator:
         for k in range(clusters.size):
             q = self._prints[of[k]]
             beams = slice(int(clusters["first"][k]), int(clusters["last"][k]) + 1)
-            if q["revealed"] == 2:
+            if q["revealed"]:
                 span = np.arange(beams.start, beams.stop)
                 span = span[(view.background.states[span] == FOREGROUND) & ~view.claimed[span]]
-                view.background.adopt(span, view.ranges[span])
+                view.background.adopt(span, view.ranges[span], ADOPTED[q["revealed"]])
             elif somebodys[k] or (q["hits"] >= 3 and q["hits"] > 0.6 * q["looks"]):
                 view.claimed[beams] = True
         guard(view.background.states, view.claimed)

@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Why a print is furniture: by its looks, or because a piece that has gone from nearby looks like it.
+LOOKS, MOVED = 1, 2
+#: The weight of either in the background: what only looks like it cannot turn up elsewhere as a piece, at first.
+ADOPTED = (0.0, 0.1, 0.3)
 #: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free, and so long if
 #: it is one piece. Its width is then the same within this (m) and as far as the beams tell.
 _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
@@ -19,12 +23,12 @@ _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 #: Its width is the same within this (m) and as far as the beams tell.
 _THIN_WIDTH_M = 0.01
-#: The legs of a chair that was moved stand still within so long (s).
-_TOGETHER_S = 2.0
+#: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
+_TOGETHER_S, _LEGS_M = 2.0, 0.2
 #: The ranges of one surface differ so little from beam to beam (m).
 _SAME_M = 0.05
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
-_GONE_S, _WEIGHT = 0.8, 0.12
+_GONE_S, _WEIGHT = 0.8, 0.25
 #: It cannot stand at its new place so long (s) before it is seen to have gone, unless who pushes it hides that.
 _EARLY_S = 2.0
 
@@ -91,13 +95,14 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
 
 def _legs(print_: Any, prints: Any) -> bool:
     """Whether the print and at least two others are thin, near each other, and stand there since the same time."""
-    if print_["width"] > _THIN_M or print_["given"] == 1:
-        # What was put down by somebody who stands beside it has not been pushed there.
+    if print_["width"] > _THIN_M or print_["given"] == 1 or print_["mutes"] > print_["hits"]:
+        # What was put down by somebody who stands beside it has not been pushed there; parts of what is black or
+        # glossy are no legs.
         return False
     away = np.hypot(prints["x"] - print_["x"], prints["y"] - print_["y"])
     thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)
-    since = np.abs(prints["first"] - print_["first"])
-    legs = thin & (away > 0.08) & (away < _GROUP_M) & (since < np.where(prints["revealed"] == 2, 6.0, _TOGETHER_S))
+    since = np.abs(prints["rested"] - print_["rested"])
+    legs = thin & (away > _LEGS_M) & (away < _GROUP_M) & (since < np.where(prints["revealed"] > 0, 6.0, _TOGETHER_S))
     return int(np.count_nonzero(legs)) >= 2
 
 
@@ -124,15 +129,15 @@ class Furniture:
             return True
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
-        near = [p for p in near if print_["first"] - p.t + _GONE_S > -_EARLY_S]
+        near = [p for p in near if print_["rested"] - p.t + _GONE_S > -_EARLY_S]
         best, best_cost = None, 1.0
         width, spacing = float(print_["width"]), float(print_["spacing"])
         for piece in near:
             if any(math.hypot(piece.x - x, piece.y - y) < 0.05 for _, x, y in self._found):
                 continue
             thin = width < _THIN_M
-            if print_["first"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
-                thin and not self._grouped(piece, pieces)
+            if print_["rested"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
+                thin and not self._grouped(piece, pieces, _THIN_M + spacing)
             ):
                 continue
             least = _THIN_WIDTH_M if thin else _WIDTH_M
@@ -158,9 +163,10 @@ class Furniture:
         )
 
     @staticmethod
-    def _grouped(piece: Piece, pieces: list[Piece]) -> bool:
-        return any(
+    def _grouped(piece: Piece, pieces: list[Piece], thin: float) -> bool:
+        return piece.width < thin and any(
             other is not piece
+            and other.width < thin
             and 0.06 < math.hypot(other.x - piece.x, other.y - piece.y) < _GROUP_M
             and abs(other.t - piece.t) < _GROUP_S
             for other in pieces

@@ -49,6 +49,7 @@ def swap(body: Any) -> None:
 def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) -> None:
     """The first foot was seen ``late`` s into the sweep that began at t: it stands, has landed, or swings."""
     since = prints[c_print].first if c_print >= 0 else t
+    stays = c_print >= 0 and c_print == body.a_print and prints[c_print].rested <= body.a_stood
     dt = t - body.a_seen
     body.a_vx, body.a_vy = 0.0, 0.0
     swings = False
@@ -64,7 +65,8 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
     if swings:
         return
     elsewhere = _ROLL_M if body.shoe >= SHOES else _STANCE_M
-    if np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0:
+    anew = np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0
+    if anew and not stays:
         beat(body, body.a_stood - body.a_land, since - body.a_stood)
         body.a_ox, body.a_oy = body.a_px, body.a_py
         body.a_px, body.a_py = c.x, c.y

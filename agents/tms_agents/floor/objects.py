@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
-from tms_agents.floor.freespace import FREE, HIT, QUIET, SILENT
+from tms_agents.floor.freespace import FREE, HIDDEN, HIT, QUIET, SILENT
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -21,6 +21,8 @@ OBJECT, FURNITURE = 1, 2
 _ARM_M, _FAR_M = 0.5, 1.6
 #: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
 _SURE, _PER_SCAN = 7.5, 1.5
+#: While it is hidden, looks past the edge of what hides it (mixed pixels) are forgotten in this time (s).
+_FORGET_S = 2.0
 #: Things overlap if they are nearer than this share of their half widths (and m).
 _OVERLAP, _BESIDE_M = 0.6, 0.01
 #: Parts of what is black or glossy are so near each other (m).
@@ -38,14 +40,22 @@ _MUTES, _SELDOM = 10, 0.06
 #: Somebody lost sight of so near (m) may still stand there for so long (s), on two feet so near each other (m) that are
 #: seen again at the same time (within s).
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
+#: The same of somebody of whom one thing alone was seen that did not move.
+_NOWHERE_S = 8.0
 #: No foot looks narrower (m).
 _FOOT_M = 0.06
+#: Whoever is there, what is so broad (m) is furniture, where there are no robots.
+_BROAD_M = 0.45
 #: Robots stand for so long (s); what stands behind something is seen in part in this share of its sightings.
 _PARKS_S, _COVERED = 60.0, 0.8
 #: A robot that was here so long ago (s) may still be.
 _ROBOTS_S = 120.0
 #: Nobody stands with the feet so far apart (m) for so long (s).
 _ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
+#: A foot stands at a wall or a piece of furniture for so long (s) at most.
+_LEANS_S = 6.0
+#: What joins it may be a thing while who stands or drives beside both has not gone, for so long (s).
+_JOINED_S = 3.0
 #: Surfaces lie this uncertain behind what is seen (m²).
 _SURFACE_VAR = 0.006**2
 
@@ -94,6 +104,10 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
             if thing.doubt < 4.0:
                 thing.rate -= 0.02 * thing.rate
                 thing.solid -= 0.02 * thing.solid
+        elif seen.verdict == HIDDEN:
+            fade = np.exp(-dt / _FORGET_S)
+            thing.free *= fade
+            thing.doubt *= fade
         if seen.verdict == HIT or seen.verdict == FREE:
             thing.free_at = t
         if thing.free > 0.0:
@@ -111,13 +125,13 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
         return True
     if t - q.first > _STANDS_S or q.given:
         return False
-    lost = False
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
-            lost = True
-    if lost and q.whole < 0.5 * q.hits:
-        return True
+            # Who was found to be nowhere but on this is hardly there.
+            nowhere = max(body.a_seen, body.b_seen) < 0.0 and t - q.first > _NOWHERE_S
+            if q.whole < 0.5 * q.hits and not nowhere:
+                return True
     if q.width < _FOOT_M:
         return False
     for o in range(prints.size):
@@ -140,9 +154,8 @@ def _astride(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
 
 
 @njit(cache=True)
-def _plain(q: Any, t: float, rest_s: float) -> bool:
-    """Whether enough has been seen of the print: so many beams, so often, and all of it."""
-    age = t - q.first
+def _plain(q: Any, age: float, t: float, rest_s: float) -> bool:
+    """Whether enough has been seen of the print, ``age`` s old: so many beams, so often, and all of it."""
     # The smallest thing wanted is 3 cm wide and gives so many beams; one beam alone is believed later.
     # What is silent most of the time shows less of itself.
     seldom = t - q.silent < 1.0 and q.mutes >= _MUTES and q.hits > _SELDOM * (q.looks + q.mutes)
@@ -191,23 +204,26 @@ def _ripe(
         q = prints[j]
         ripe[j] = 0
         # What is not there now may be a foot that has just been lifted.
-        if not q.used or q.last < t or q.revealed == 2:
+        if not q.used or q.last < t or q.revealed:
             continue
         astride = q.owner >= 0 and _astride(q, prints, j, bodies, t)
         if q.owner >= 0 and not astride:
             continue
-        age = t - q.first
+        age = t - (q.first if robots else q.rested)
         if age < rest_s or q.hits < 0.6 * q.looks or q.hits < 4:
             continue
         # What somebody put down may touch a wall.
+        leans = age > (_LEANS_S if t - q.busy < alone_s else _JOINED_S if q.width < width_m else 0.0)
         if q.attached > 0.5 and q.given == 0:
-            ripe[j] = FURNITURE
-            count += 1
+            if leans:
+                ripe[j] = FURNITURE
+                count += 1
             continue
-        if q.spread > 0.03 or not _plain(q, t, rest_s):
+        broad = q.width > _BROAD_M and not robots
+        if q.spread > (0.05 if broad else 0.03) or not _plain(q, age, t, rest_s):
             continue
-        alone = t - q.busy > alone_s
-        given = q.given == 1 and age > 1.25 * rest_s
+        alone = t - q.busy > alone_s or broad
+        given = q.given == 1 and age > (_PART_S if robots else 1.25 * rest_s)
         nobodys = alone or given or astride or q.spare >= _SPARE_S
         if not nobodys and (t - q.owned < alone_s or not _third(q, bodies, t, rest_s)):
             continue
@@ -272,7 +288,8 @@ class Objects:
         thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
-        thing["since"], thing["seen"], thing["free"], thing["doubt"], thing["free_at"] = print_["first"], t, 0.0, 0.0, t
+        thing["since"], thing["seen"], thing["free_at"] = print_["rested"], t, t
+        thing["free"], thing["doubt"] = 0.0, 0.0
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
         thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))

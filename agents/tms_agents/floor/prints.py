@@ -14,6 +14,15 @@ Array = NDArray[np.float64]
 
 #: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
 _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
+#: What had rested for so long (s) and comes out again so near (m, and per metre of range) and as wide (share, m) as it
+#: was is the same: no foot steps so exactly.
+_RESTED_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.02, 0.003, 0.25, 0.015
+#: What fewer beams meet flickers at the edge of something.
+_SPECK = 1.5
+#: What has been seen for so long (s) is not a foot of somebody whom one lost sight of before.
+_NOT_HIS_S = 1.0
+#: No foot is so wide (m).
+_WIDE_M = 0.3
 #: So many times more often seen than seen whole.
 _HARDLY = 8
 #: What is black or glossy echoes now and then: at least once in this time (s).
@@ -24,6 +33,16 @@ _STILL_M, _STILL = 0.008, 0.001
 NEAR_M = 0.36
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
+
+
+@njit(cache=True)
+def _same(q: Any, c: Any) -> bool:
+    """Whether the cluster is what was at the print before something else hid it."""
+    if q.beams < _SPECK or np.hypot(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (
+        0.25 * q.width if c.cut else 0.0
+    ):
+        return False
+    return bool(q.last - q.rested > _RESTED_S and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
 
 
 @njit(cache=True)
@@ -80,7 +99,7 @@ def follow(
             of[k] = j
             taken[j] = True
             q = prints[j]
-            q.used, q.first, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, 0, 0, 0, 0, 0
+            q.used, q.first, q.rested, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, t, 0, 0, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
@@ -89,12 +108,17 @@ def follow(
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
-            q.first, q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = t, 0, 0, 0, 0, 0, 0.0
+            q.first, q.rested = t, t
+            q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
             q.revealed = 0
-        if t - max(q.last, q.silent) > _GONE_S:
-            # Somebody else may stand there now.
-            q.first, q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = t, 0, 0, 0, 0, 0, 0.0
+        if t - max(q.last, q.silent) > _GONE_S and _same(q, c):
+            # Somebody may stand there now, but if it is nobody's foot it has been there all the time.
+            if q.width < _WIDE_M:
+                q.first = t
+        elif t - max(q.last, q.silent) > _GONE_S:
+            q.first, q.rested = t, t
+            q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
         q.hits += 1
         q.looks += 1
         q.last = t
@@ -143,6 +167,10 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
         body.still = 0.0
         if body.used and body.a_print >= 0 and body.b_print >= 0 and max(t - body.a_seen, t - body.b_seen) < 0.5:
             body.still = t - max(prints[body.a_print].still, prints[body.b_print].still)
+        body.older = 0.0
+        j, land = (body.a_print, body.a_land) if body.a_seen >= body.b_seen else (body.b_print, body.b_land)
+        if body.used and j >= 0:
+            body.older = land - prints[j].rested
     for j in range(prints.size):
         q = prints[j]
         if not q.used:
@@ -157,6 +185,10 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
             body = bodies[b]
             if not body.used:
                 continue
+            if body.stale and q.last == t and t - q.first > _NOT_HIS_S:
+                # What has been seen there for a while is no foot of one who is not seen.
+                body.a_print = -1 if body.a_print == j else body.a_print
+                body.b_print = -1 if body.b_print == j else body.b_print
             if not body.confirmed:
                 # Somebody who is not believed yet, but has walked.
                 walked = np.hypot(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3

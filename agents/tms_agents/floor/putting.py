@@ -86,7 +86,7 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
         if shown:
             for o in range(prints.size):
                 p = prints[o]
-                pair = o != j and p.used and p.owner < 0 and p.revealed != 2 and t - p.last < 0.3
+                pair = o != j and p.used and p.owner < 0 and not p.revealed and t - p.last < 0.3
                 if pair and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
                     shown = False
                     break

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from tms_agents.devices.scans import Sweep
 
@@ -52,11 +51,9 @@ class Scene:
 class FloorSettings:
     """How careful the estimator is; the defaults suit a room of some metres and scans at 7 to 40 Hz.
 
-    ``feet``: at ankle height both legs are seen all the time ("legs"); some millimetres above the floor a foot is seen
-    only while it stands ("prints"); "auto" allows for both.
+    Whether legs are seen or, some millimetres above the floor, shoes while they stand, it learns from everybody's feet.
     """
 
-    feet: Literal["legs", "prints", "auto"] = "auto"
     #: Background: how long it is only learned, from when on something may be called foreground, and how it forgets.
     learn_s: float = 6.0
     start_s: float = 1.5
@@ -87,8 +84,6 @@ class FloorSettings:
     absorb_s: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.feet not in ("legs", "prints", "auto"):
-            raise ValueError(f"feet must be legs, prints or auto, not {self.feet!r}")
-        numbers = [getattr(self, name) for name in self.__dataclass_fields__ if name != "feet"]
+        numbers = [getattr(self, name) for name in self.__dataclass_fields__]
         if not all(number > 0 and math.isfinite(number) for number in numbers):
             raise ValueError("the floor settings must be positive numbers")

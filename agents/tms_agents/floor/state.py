@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 
 #: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
-#: (x, y) m mean of where it was seen, first and last time seen, hits, looks and mutes (scans
-#: since that hit it, that could have, that saw nothing at all there; of those that hit it, that saw all of it, and only
-#: what something new before it left), width m, spread m (mean
-#: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), freed (when a body was last
-#: near), touched (label of the last owner), spare (s for which somebody beside it has shown two other feet), beams of
-#: the last sighting.
+#: (x, y) m mean of where it was seen, first time seen since it was hidden, since when it has rested there, hidden or
+#: not, last time seen, hits, looks and mutes (scans since that hit it, that could have, that saw nothing at all there;
+#: of those that hit it, that saw all of it, and only what something new before it left), width m, spread m (mean
+#: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), busy (when a body was last near),
+#: spare (s for which somebody beside it has shown two other feet), revealed (`furniture.LOOKS`, `furniture.MOVED`),
+#: beams of the last sighting.
 PRINT = np.dtype(
     [
         ("used", "i8"),
         ("x", "f8"),
         ("y", "f8"),
         ("first", "f8"),
+        ("rested", "f8"),
         ("last", "f8"),
         ("hits", "i8"),
         ("looks", "i8"),
@@ -51,7 +52,9 @@ PRINT = np.dtype(
 #: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began,
 #: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
 #: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
-#: who it is (look, pace), and of the one whose name it has (own, own_pace); sure is how likely that name is.
+#: who it is (look, pace), and of the one whose name it has (own, own_pace); sure is how likely that name is. Further:
+#: for how long (s) and where it has stood on one foot alone (lone), for how long what it stands on had been there
+#: before (older, s), where and since when it has stayed (rest).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -101,6 +104,12 @@ BODY = np.dtype(
         ("stride", "f8"),
         ("side", "f8"),
         ("lone", "f8"),
+        ("lone_x", "f8"),
+        ("lone_y", "f8"),
+        ("older", "f8"),
+        ("rest_x", "f8"),
+        ("rest_y", "f8"),
+        ("rest_at", "f8"),
         ("pushed", "f8"),
         ("quality", "f8"),
         ("single", "f8"),

@@ -15,6 +15,7 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.bodies import misled, stuck
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
+from tms_agents.floor.gait import SHOES
 from tms_agents.floor.masks import Area
 from tms_agents.floor.settings import FloorSettings, Scene
 
@@ -26,12 +27,25 @@ _NOTHING, _CONFIRM, _LOST, _BACK, _GONE, _MOVED = 0, 1, 2, 3, 4, 5
 _LONE_S = 4.0
 #: Where the other foot was last seen, within this (m), and it may be hidden, time counts by this share.
 _BEHIND, _STEP_M = 0.2, 0.1
+#: What had stood there for so long (s) before somebody's only foot came there is most likely a thing: time counts more.
+_OLDER_S, _FASTER = 1.0, 2.5
 #: Nobody stands for so long (s) without shifting a foot.
 _STILL_S = 40.0
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
+#: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
+#: seen in this share of the scans at least.
+_BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
+#: What moved with people beside it for this share of its way may have been pushed.
+_BESIDE = 0.15
+#: What began as a piece of furniture and is still so broad (m) in the mean is one.
+_PIECE_M = 0.25
+#: Who stays within this (m) rests.
+_REST_M = 0.15
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run.
 _QUALITY = 0.3
+#: Who was seen so often is somebody; how much what is seen next of somebody lost must look like feet.
+_KNOWN, _DOUBTED = 200, 0.5
 #: What is new for so long (s) may turn out to be furniture.
 _NEW_S = 30.0
 #: What is pushed is left within this (m).
@@ -70,8 +84,30 @@ def _is_lone(body: Any, t: float) -> bool:
 @njit(cache=True)
 def _is_parked(body: Any, t: float) -> bool:
     """Whether it is as wide as furniture, has never gone far by itself, and stands still."""
+    if body.machine:
+        return False
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
-    return bool(body.wide > 0.5 and not body.machine and t - since > _PARKED_S)
+    if body.wide > 0.5:
+        return bool(t - since > _PARKED_S)
+    if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
+        # It came by itself.
+        return False
+    # Furniture half hidden by who pushes it: as broad as no leg or shoe, or broad once and hardly ever on two feet.
+    rests = t - body.rest_at
+    broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
+    return bool((broad and rests > _PARKED_S) or (_is_footless(body) and rests > 2.0 * _PARKED_S))
+
+
+@njit(cache=True)
+def _is_known(body: Any) -> bool:
+    """Whether two feet have been seen so often that it is a person."""
+    return bool(body.hits > _KNOWN and body.both > _FEET * body.hits)
+
+
+@njit(cache=True)
+def _is_footless(body: Any) -> bool:
+    """Whether it has been broader than two feet side by side, and two feet were hardly ever seen."""
+    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits)
 
 
 @njit(cache=True)
@@ -112,12 +148,15 @@ def _review(
         if not body.used:
             continue
         unseen = t - body.seen
-        if body.wide > 0.3 and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
+        if (body.wide > 0.3 or body.far > _FAR_M) and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
+        if unseen == 0.0 and np.hypot(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
+            body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
         if not body.confirmed:
             way = np.hypot(body.x - body.x0, body.y - body.y0)
             age = body.seen - body.first
-            if unseen > 0.45 or (age > 3.0 and way < 0.15) or body.hits < 0.5 * body.looks - 1.0:
+            parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
+            if unseen > 0.45 or (age > 3.0 and way < 0.15) or parked or body.hits < 0.5 * body.looks - 1.0:
                 body.used = 0
                 continue
             if unseen > 0.0:
@@ -148,20 +187,31 @@ def _review(
                 actions[b] = _CONFIRM
             continue
         if unseen == 0.0:
-            if not _is_lone(body, t):
-                body.lone = 0.0
-            else:
-                unseen_b = body.a_seen >= body.b_seen
-                x, y, at = (body.bx, body.by, body.b_seen) if unseen_b else (body.ax, body.ay, body.a_seen)
+            only_a = body.a_seen >= body.b_seen
+            foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
+            if _is_lone(body, t):
+                x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
                 behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
-                body.lone += dt * (_BEHIND if behind else 1.0)
+                if body.lone == 0.0:
+                    body.lone_x, body.lone_y = foot_x, foot_y
+                if body.older > _OLDER_S:
+                    body.lone += dt * _FASTER
+                else:
+                    body.lone += dt * (_BEHIND if behind else 1.0)
+            elif (
+                max(t - body.a_seen, t - body.b_seen) < 1.0
+                or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
+            ):
+                # What was hidden meanwhile goes on being alone.
+                body.lone = 0.0
             single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
             body.single = body.single + dt if single else 0.0
-            if body.lone > _LONE_S or misled(body):
+            if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
                 # One thing that does not move is no person: whoever it was is somewhere else.
                 actions[b] = _LOST
-            elif body.quality < _QUALITY or _is_parked(body, t):
-                actions[b] = _GONE
+            elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
+                # Somebody who is known for long has gone on from there.
+                actions[b] = _LOST if _is_known(body) else _GONE
             elif body.stale:
                 actions[b] = _BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
@@ -239,7 +289,7 @@ class Tracks:
             elif action == _CONFIRM:
                 events += self._confirm(index, t, new_label, was_furniture)
             elif (
-                body["wide"] > 0.5
+                (body["wide"] > 0.5 or _is_footless(body))
                 and t - body["first"] < _NEW_S
                 and body["from_furniture"] == 0
                 and (body["pushed"] > 0.8 or was_furniture(body))
@@ -306,11 +356,13 @@ class Tracks:
         if self._outside(body):
             self._association.forget(index)
             return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
-        if body["lone"] > _LONE_S or misled(body):
+        if body["seen"] == t:
+            # What is seen is something else.
             self._association.decide()
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
             body["lone"] = body["wide"] = 0.0
+            body["quality"] = max(body["quality"], _DOUBTED)
         body["stale"] = 1
         body["vx"] = body["vy"] = 0.0
         return [Stale(t, int(body["label"]))]
@@ -331,13 +383,13 @@ class Tracks:
         self, index: int, t: float, new_label: Callable[[], int], was_furniture: Callable[[Any], bool]
     ) -> list[FloorEvent]:
         body = self.bodies[index]
-        if body["from_furniture"] == 1 and body["wide"] > 0.3:
+        if body["from_furniture"] == 1 and (body["wide"] > 0.3 or body["width"] > _PIECE_M):
             # Nothing is pushed so far; it goes by itself.
             way = math.hypot(body["x"] - body["x0"], body["y"] - body["y0"])
             if way < _PUSHED_M or body["pushed"] > 0.4:
                 return []
             body["from_furniture"] = -1
-        elif body["wide"] > 0.3 and (body["pushed"] > 0.6 or was_furniture(body)):
+        elif (body["wide"] > 0.3 or _is_footless(body)) and (body["pushed"] > 0.6 or was_furniture(body)):
             body["from_furniture"] = 1
             return []
         self._association.decide()

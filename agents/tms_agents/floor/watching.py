@@ -112,5 +112,5 @@ def config_of(recordings: Sequence[Recorded], like: FloorConfig | None = None) -
         )
     base: dict[str, Any] = {"agent": "recording", "room": "recording", "spool": {"path": "recording.spool"}}
     if like is not None:
-        base |= like.model_dump(include={"scene", "robots", "feet", "estimator", "report_m", "report_s"})
+        base |= like.model_dump(include={"scene", "robots", "estimator", "report_m", "report_s"})
     return FloorConfig.model_validate(base | {"lasers": lasers})

@@ -23,8 +23,6 @@ from tms_agents.simulation.room import (
 BOARD = "shelf"
 #: Weigh so long with the field off, then read the tags.
 WEIGH_S = 0.6
-#: The laser is at the height of ankles.
-_FEET = 'feet = "legs"\n'
 
 
 def install(folder: Path, hardware: Hardware, url: str, room: str) -> dict[str, Path]:
@@ -41,15 +39,14 @@ def install(folder: Path, hardware: Hardware, url: str, room: str) -> dict[str, 
             write_calibration(folder / f"{name}.calibration.toml", {BOARD: bench.calibration()})
             text = _cabinet(bench, plugs)
         configs[name] = folder / f"{name}.toml"
-        top = _FEET if name == FLOOR_AGENT else ""
-        configs[name].write_text(_head(name, url, room, top) + text)
+        configs[name].write_text(_head(name, url, room) + text)
     return configs
 
 
-def _head(agent: str, url: str, room: str, top: str) -> str:
+def _head(agent: str, url: str, room: str) -> str:
     return f"""agent = {_text(agent)}
 room = {_text(room)}
-{top}
+
 [server]
 url = {_text(url)}
 linger_s = 0.02

@@ -76,7 +76,7 @@ def test_replay(story_scans, tmp_path, capsys):
 def test_replay_in_the_frame_of_the_sensor_and_of_several(story_scans, tmp_path):
     """A file without a pose is in its own frame; two sensors of one run see one walker."""
     out, npz = tmp_path / "out.json", str(story_scans / "story.npz")
-    settings = ["--config", str(story_scans / "floor.toml"), "--feet", "legs"]
+    settings = ["--config", str(story_scans / "floor.toml")]
     assert cli.main(["floor", "replay", npz, "--out", str(out), *settings]) == 0
     last = json.loads(out.read_text())[-1]["labels"]
     ahead, left = PUT_AT[1] - POSE[1], POSE[0] - PUT_AT[0]

@@ -72,7 +72,7 @@ def test_there_is_an_example_for_each_device_and_each_part_of_a_room():
         (("[scene]", "[estimator]\nlearn = 1\n[scene]"), "learn"),
         (("[scene]", "[estimator]\nlearn_s = 0\n[scene]"), "learn_s"),
         (("[scene]", '[recording]\npath = "scans.bin"\n[scene]'), "the name of a recording ends in .scans"),
-        (("heartbeat_s = 1.0", 'feet = "hooves"'), "feet: Input should be 'legs', 'prints' or 'auto'"),
+        (("heartbeat_s = 1.0", 'feet = "legs"'), "feet: Extra inputs are not permitted"),
         (("[scene]", LASER + "[scene]"), "two lasers are called 'laser'"),
     ],
 )
@@ -89,9 +89,9 @@ def test_what_is_wrong_is_one_line(tmp_path, capsys, change, says):
 def test_scene_and_settings_reach_the_estimator(tmp_path):
     path = tmp_path / "floor.toml"
     more = SCENE + "[[robots]]\nwidth = 0.4\nlength = 0.5\n[estimator]\nlearn_s = 3.0\n"
-    path.write_text(config_toml("lab", "http://127.0.0.1:1", LASER, more=more, top='feet = "prints"'))
+    path.write_text(config_toml("lab", "http://127.0.0.1:1", LASER, more=more))
     config = read_config(path, FloorConfig)
-    assert (config.settings().learn_s, config.settings().feet) == (3.0, "prints")
+    assert config.settings().learn_s == 3.0
     scene = config.room_scene()
     assert scene.robots == ((0.4, 0.5),) and len(scene.seats) == 1
     assert not config.tells_robots

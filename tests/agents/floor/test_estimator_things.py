@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from floor_rooms import WALLS, Room, Segment, box, cast, sweep, thing, together, walker
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, Scene, Sensor, Vanished
@@ -117,12 +118,13 @@ def test_a_robot_is_one_robot_in_parts_and_beside_people() -> None:
     assert not [one for one in born(events, "object") if one.t > 17.0]
 
 
-def test_a_trolley_that_was_pushed_is_nobody_when_it_stands() -> None:
+@pytest.mark.parametrize("size", [(0.55, 0.35), (0.26, 0.26)])
+def test_a_trolley_or_bin_that_was_pushed_is_nobody_when_it_stands(size: tuple[float, float]) -> None:
     def place(t: float) -> float:
         return float(np.interp(t, [12.0, 16.0], [2.4, 3.6]))
 
     def segments(t: float) -> tuple[Segment, ...]:
-        return (*WALLS, *box(place(t), 2.4, 0.55, 0.35))
+        return (*WALLS, *box(place(t), 2.4, *size))
 
     pusher = walker([(9.0, 4.9, 1.6), (11.0, 2.1, 1.9), (12.0, 2.1, 1.9), (16.0, 3.3, 1.9), (20.0, 4.9, 0.8)])
     estimator, events = Room(pusher, segments).play(30.0)

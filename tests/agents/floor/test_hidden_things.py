@@ -1,0 +1,101 @@
+"""What is hidden for a while: it is not given up, it is the same when it comes out, and furniture is furniture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tms_agents.floor import FloorSettings
+from tms_agents.floor.background import FOREGROUND
+from tms_agents.floor.freespace import FREE, HIDDEN, LOOK
+from tms_agents.floor.furniture import Furniture, Piece
+from tms_agents.floor.objects import Objects
+from tms_agents.floor.prints import follow
+from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.state import BODY, PRINT, THING, empty
+
+PERIOD_S = 0.1
+#: Something new stands right before a laser of three beams, so that nothing behind it is seen.
+COVERED = (np.full(3, 0.5), np.full(3, FOREGROUND, np.int8), np.full(3, 5.0), np.zeros(3), -0.05, 0.05)
+
+
+def removals(verdicts: list[int]) -> int:
+    """Of one thing that is seen like this, scan by scan."""
+    objects, looks = Objects(empty(THING, 1), FloorSettings()), np.zeros(1, LOOK)
+    thing = objects.things[0]
+    thing["used"], thing["label"], thing["rate"], thing["solid"], thing["half"] = 1, 1, 0.99, 0.99, 0.05
+    gone = 0
+    for k, verdict in enumerate(verdicts):
+        looks["verdict"] = verdict
+        gone += len(objects.weigh(looks, empty(BODY, 1), k * PERIOD_S, PERIOD_S))
+    return gone
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(15, 40), st.integers(0, 14))
+def test_glimpses_past_the_edge_of_what_hides_a_thing_do_not_add_up(every: int, first: int) -> None:
+    assert removals([FREE if k % every == first else HIDDEN for k in range(2000)]) == 0
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 100))
+def test_a_thing_whose_place_is_seen_to_be_empty_after_all_has_gone(hidden: int) -> None:
+    assert removals([HIDDEN] * hidden + [FREE] * 8) == 1
+
+
+def seen(prints: np.ndarray, x: float, width: float, t: float) -> None:
+    """One cluster at (x, 0), or nothing at all where its width is 0."""
+    clusters = np.zeros(1 if width else 0, CLUSTER)
+    clusters["x"], clusters["width"], clusters["near"], clusters["n"] = x, width, x, 5
+    clusters["spacing"], clusters["mirror"] = 0.01, -1
+    follow(clusters, np.zeros(clusters.size, np.int64), prints, 0, t, *COVERED)
+
+
+@pytest.mark.parametrize(
+    ("stood_s", "x", "width", "same"),
+    [(3.0, 2.01, 0.08, True), (0.7, 2.01, 0.08, False), (3.0, 2.06, 0.08, False), (3.0, 2.01, 0.16, False)],
+)
+def test_what_comes_out_again_at_its_place_has_rested_all_the_time(
+    stood_s: float, x: float, width: float, same: bool
+) -> None:
+    """Unless it had stood no longer than a foot, or is a little elsewhere, or not as wide."""
+    prints = empty(PRINT, 4)
+    for k in range(round(stood_s / PERIOD_S) + 1):
+        seen(prints, 2.0, 0.08, k * PERIOD_S)
+    hidden_s = 2.0
+    seen(prints, 2.0, 0.0, stood_s + 0.5 * hidden_s)
+    again = stood_s + hidden_s
+    seen(prints, x, width, again)
+    (one,) = prints[prints["used"] == 1]
+    assert one["rested"] == (0.0 if same else again)
+    assert one["first"] == again
+
+
+def thin(*places: tuple[float, float], mutes: int = 0) -> np.ndarray:
+    """Thin prints that came together."""
+    prints = empty(PRINT, len(places))
+    prints["used"], prints["hits"], prints["looks"], prints["mutes"], prints["owner"] = 1, 10, 10, mutes, -1
+    prints["x"], prints["y"], prints["width"], prints["spacing"] = *zip(*places, strict=True), 0.03, 0.01
+    return prints
+
+
+def test_three_legs_that_came_together_are_a_chair_and_parts_of_one_black_thing_are_not() -> None:
+    chair = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4))
+    assert Furniture().explains(chair[0], chair, [], 5.0)
+    close = thin((2.0, 2.0), (2.1, 2.0), (2.0, 2.1))
+    assert not Furniture().explains(close[0], close, [], 5.0)
+    black = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4), mutes=30)
+    assert not Furniture().explains(black[0], black, [], 5.0)
+
+
+def test_a_thin_thing_is_no_leg_of_a_box_that_went() -> None:
+    alone = thin((2.0, 2.0))
+    leg, other, side = (
+        Piece(1.0, 2.5, 2.0, 0.03, 1.0),
+        Piece(1.0, 2.9, 2.0, 0.03, 1.0),
+        Piece(1.0, 2.9, 2.0, 0.3, 1.0),
+    )
+    assert Furniture().explains(alone[0], alone, [leg, other], 5.0)
+    assert not Furniture().explains(alone[0], alone, [leg, side], 5.0)
