@@ -13,6 +13,7 @@ from tms_agents.cabinet.balance import Balance, search
 from tms_agents.cabinet.blocks import Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
 from tms_agents.cabinet.caution import IN_HAND_S, Caution
+from tms_agents.cabinet.episodes import Outcome
 from tms_agents.cabinet.events import CabinetEvent, Stay, Vanished
 from tms_agents.cabinet.fusion import Evidence, Explanation, explain
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
@@ -239,9 +240,15 @@ class CabinetEstimator:
             return []
         odd = fits_none(best, step, self._namer.loose())
         odd = odd or self._caution.may_be_the_rest(step, best)
-        if self._settings.knows_places and (odd or (best.several and best.kind != "slide")):
+        # A slide is simple, unless something else has been brought that may stand there now.
+        several = best.several and (best.kind != "slide" or bool(self._namer.loose()))
+        if self._settings.knows_places and (odd or several):
+            outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if steady >= _VERDICT_S else None
+            if outcome is not None:
+                return self._decided(step, outcome)
             if waited < self._settings.stubborn_s:
-                return self._by_verdict(step, steady)
+                self._detector.hold(step)
+                return []
             if steady < _VERDICT_S:
                 self._detector.ignore(step)
                 return []
@@ -260,12 +267,8 @@ class CabinetEstimator:
             self._book.doubt(step, best, others)
         return self._take(step, best)
 
-    def _by_verdict(self, step: Step, steady: float) -> list[CabinetEvent]:
+    def _decided(self, step: Step, outcome: Outcome) -> list[CabinetEvent]:
         """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
-        outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if steady >= _VERDICT_S else None
-        if outcome is None:
-            self._detector.hold(step)
-            return []
         self._detector.accept(step)
         self._rested, self._book.settling = step.settled, None
         events = self._hindsight.tell(outcome, step.now)
