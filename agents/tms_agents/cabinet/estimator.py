@@ -179,13 +179,24 @@ class CabinetEstimator:
                 self._book.settling = None
                 events += revised
         step = self._balance.rest(t, level, variance)
+        if step is None:
+            events += self._nothing(t)
         if step is not None and seconds >= _CORRECT_S:
             events += self._correct(step)
         return events
 
+    def _nothing(self, t: float) -> list[CabinetEvent]:
+        """Stays that turn out to weigh nothing, unless their tags are read."""
+        events: list[CabinetEvent] = []
+        for thing in self._balance.faded():
+            if thing.tag is None or not self._presence.is_present(thing.tag):
+                del self._shelf.things[thing.id]
+                events.append(Vanished(t, thing.id, *thing.centre(self._geometry)[2:]))
+        return events
+
     def _correct(self, step: Step) -> list[CabinetEvent]:
         """The sum of the stays is not what the cells show: what is more probable?"""
-        best = search(step, self._shelf, self._recent_evidence(), self._settings, self._balance.right_at)[0]
+        best = search(step, self._balance, self._shelf, self._recent_evidence(), self._settings)[0]
         if best.kind == "unknown" or best.score < _BALANCE_SURE:
             return []
         return self._apply(step, best)
@@ -226,7 +237,7 @@ class CabinetEstimator:
             return []
         if best.kind == "unknown" and steady > _BALANCE_S and not final and whole is not None:
             self._rested = step.settled
-            other = search(whole, self._shelf, self._recent_evidence(), self._settings, self._balance.right_at)[0]
+            other = search(whole, self._balance, self._shelf, self._recent_evidence(), self._settings)[0]
             if other.kind != "unknown" and other.score > _BALANCE_SURE:
                 self._detector.accept(step)
                 return self._apply(whole, other)
@@ -281,7 +292,7 @@ class CabinetEstimator:
 
     def _whole(self, step: Step) -> Step | None:
         """All that the stays and the zeros leave unexplained after ``step``, not only what is new."""
-        if self._balance.zero is None:
+        if not self._balance.known:
             return None
         level, variance = step.before + step.change, step.variance - step.before_variance
         return self._balance.compare(step.onset, step.settled, step.now, level, variance)
@@ -297,7 +308,6 @@ class CabinetEstimator:
             badly = len(explanation.removed) == 1 and explanation.kind == "take" and not explanation.tight
             weight_g = -step.weight_g if badly else at.weight_g
             self._namer.left(thing, step.settled, weight_g, at.weight_sd_g)
-        self._balance.removed(explanation.removed, step.now, tight=explanation.tight)
         self._rested = step.settled
         self._book.newest = []
         events = self._book.apply(step, explanation)
