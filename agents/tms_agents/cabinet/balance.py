@@ -1,7 +1,7 @@
 """Mass balance: at rest the cells show their zeros and the sum of all loads. If they do not, an explanation was wrong.
 
-Zeros drift and loads creep slowly (`ledger`). When the load at rest is beyond what that allows, every set of stays that may be over is
-tried, with and without one new thing, and one stay that was measured badly or slid. Tags that are read or missed count.
+Zeros drift and loads creep slowly (`ledger`). When the load at rest is beyond what that allows, every set of stays that
+may be over is tried, with and without one new thing, and one stay that was measured badly or slid. Tags count.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from tms_agents.cabinet.densities import PutDensity, normal
 from tms_agents.cabinet.fusion import Evidence, Explanation, Kind
 from tms_agents.cabinet.geometry import Array
-from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.ledger import Ledger
+from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steady import chi_square_limit
 from tms_agents.cabinet.steps import Step
@@ -31,8 +31,6 @@ _UNKNOWN, _MOVED, _MOVED_G = 1e-3, 0.02, 8.0
 _WALK_G, _FLOOR_G = 6.0, 1.0
 #: A board that is shaken swings by so much.
 _SHAKEN_G = 6.0
-#: A rest is another one if nobody looked at it for so long.
-_AGAIN_S = 0.9
 #: Up to so many stays may be over at once.
 _MOST_OVER, _MANY = 3, 10
 #: What nothing explains for so long is a zero that has moved.
@@ -44,10 +42,8 @@ class Balance:
 
     def __init__(self, shelf: Shelf, settings: EstimatorSettings) -> None:
         self._shelf, self._settings = shelf, settings
-        #: What is known without the present rest, and with it; None while nothing is known.
-        self._before: Ledger | None = None
         self._ledger: Ledger | None = None
-        self._seen, self._rested = -math.inf, -math.inf
+        self._seen = -math.inf
         self._off_since: float | None = None
         #: When the sum was right last.
         self.right_at = -math.inf
@@ -62,8 +58,7 @@ class Balance:
     def loosen(self, grams: float) -> None:
         """The zeros may have jumped by so much each."""
         if self._ledger is not None:
-            self._ledger.loosen(grams)
-            self._before = self._ledger
+            self._ledger.walk(grams**2)
 
     def rest(self, now: float, level: Array, variance: Array) -> Step | None:
         """The load rests at ``level``, (k,) g: follow the zero, or return what is too much or too little."""
@@ -71,29 +66,20 @@ class Balance:
             self._ledger = Ledger(level - self._shelf.total(), variance + _FLOOR_G**2)
             self._seen = now
             self._ledger.keep(self._shelf.things)
-            self._before = self._ledger
             return None
-        changed = self._keep(now)
-        if changed or now - self._rested > _AGAIN_S:
-            self._before = self._ledger
-        self._rested = now
-        assert self._before is not None
-        step = self._compared(self._before, now, now, now, level, variance)
+        step = self.compare(now, now, now, level, variance)
         if not self.off(step):
             self._off_since, self.right_at = None, now
-            if self.shaking:
-                return None  # a level that swings tells nothing of the zeros
-            # All that this rest has told so far counts once.
-            self._ledger = self._before.copy()
-            self._ledger.observe(level, variance + _FLOOR_G**2)
-            self._ledger.teach(self._shelf.things)
+            if not self.shaking:  # a level that swings tells nothing of the zeros
+                self._ledger.observe(level, variance + _FLOOR_G**2)
+                self._ledger.teach(self._shelf.things)
             return None
         if self._off_since is None:
             self._off_since = now
         if now - self._off_since > _GIVEN_UP_S:
-            self._ledger.loosen(float(np.abs(step.change).max()))
+            self._ledger.walk(step.change**2)
             self._ledger.observe(level, variance + _FLOOR_G**2)
-            self._before, self._off_since = self._ledger, None
+            self._off_since = None
             return None
         return step
 
@@ -104,32 +90,22 @@ class Balance:
     def compare(self, onset: float, settled: float, now: float, level: Array, variance: Array) -> Step:
         """The step from what the stays make of the zeros to ``level``."""
         assert self._ledger is not None
-        self._keep(now)
-        return self._compared(self._ledger, onset, settled, now, level, variance)
+        hours = max(now - self._seen, 0.0) / 3600.0
+        self._seen = now
+        # Creep of what stands there: a random walk that has gone through its share of the load after an hour.
+        creep = 3 * self._settings.creep_per_hour * np.abs(self._shelf.total())
+        self._ledger.walk((_WALK_G**2 + creep**2) * hours)
+        self._ledger.keep(self._shelf.things)
+        before, spread = self._ledger.expected()
+        none = np.zeros((0, len(level)))
+        both = variance + spread + _FLOOR_G**2 + (_SHAKEN_G**2 if self.shaking else 0.0)
+        return Step(onset, settled, now, level - before, both, before, spread, none, none, 1.0)
 
     def without(self, stays: Collection[int], step: Step) -> tuple[Array, Array]:
         """What would be left of the level of ``step``, (k,) g, were these stays over, and its variance, (k,) g^2."""
         assert self._ledger is not None
         expected, spread = self._ledger.expected(stays)
-        _, all_of_it = self._ledger.expected()
-        return step.before + step.change - expected, np.maximum(step.variance - all_of_it, _FLOOR_G**2) + spread
-
-    def _compared(
-        self, ledger: Ledger, onset: float, settled: float, now: float, level: Array, variance: Array
-    ) -> Step:
-        before, spread = ledger.expected()
-        none = np.zeros((0, len(level)))
-        both = variance + spread + _FLOOR_G**2 + (_SHAKEN_G**2 if self.shaking else 0.0)
-        return Step(onset, settled, now, level - before, both, before, spread, none, none, 1.0)
-
-    def _keep(self, now: float) -> bool:
-        """Whether other stays are there than before."""
-        assert self._ledger is not None
-        hours = max(now - self._seen, 0.0) / 3600.0
-        self._seen = now
-        # Creep of what stands there: a random walk that has gone through its share of the load after an hour.
-        self._ledger.walk(_WALK_G * math.sqrt(hours), 3 * self._settings.creep_per_hour * math.sqrt(hours))
-        return self._ledger.keep(self._shelf.things)
+        return step.before + step.change - expected, step.variance - step.before_variance + spread
 
     def off(self, step: Step) -> bool:
         total = step.weight_g**2 / float(step.variance.sum())

@@ -43,7 +43,7 @@ _MOST_REVISIONS = 2
 _BROUGHT_S = 3.0
 #: Log-odds that a thing was taken only after the load seemed to rest, and less with every round in which it was there.
 _LATER, _LATE = -2.0, 0.5
-#: Log-odds that the tag of what was taken is still in view, in the hand, how long it stays so, and that it does for good.
+#: Log-odds that the tag of what was taken is still in view, in the hand; how long that lasts; that it lasts for good.
 _IN_HAND, _HELD_S, _KEPT = math.log(0.2), 1.5, math.log(0.01)
 #: Rounds go wrong in ways of their own: no tag's evidence counts more than this.
 _MOST_ODDS = 16.0

@@ -1,8 +1,8 @@
 """What the cells show at rest: their zeros and the loads of everything on the board, and how the errors hang together.
 
 A resting level tells the sum of all of them well, and none of them by itself. So zeros and loads are one Gaussian with
-all its correlations (a Kalman filter per cell): what was absorbed by a zero because a thing was measured badly goes back
-when that thing goes, and a zero that was known when the board was empty is still known when many things have come.
+all its correlations (a Kalman filter per cell): what a zero took up because a thing was measured badly goes back when
+that thing goes, and a zero that was known when the board was empty is still known when many things have come.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy as np
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.stays import Thing
 
-#: A load is believed to be as measured within so many of its standard deviations, a share of itself, and some g.
-_DEVIATIONS, _SHARE, _GRAMS = 2.0, 0.02, 3.0
+#: A load is as measured within its own errors, some g, and a share of itself: something light may have been taken for a
+#: part of it.
+_SHARE, _GRAMS = 0.02, 1.0
 #: A stay whose load is said to be another one by more than that is looked at afresh.
 _CHANGED_SD, _CHANGED_G = 4.0, 6.0
 #: What was measured is wrong if it is off by so many standard deviations of both.
@@ -38,52 +39,32 @@ class Ledger:
         #: What they weighed when they were entered, g.
         self._entered: dict[int, float] = {}
 
-    def copy(self) -> Ledger:
-        new = Ledger(self.mean[0], self.cov[:, 0, 0])
-        new.ids, new.mean, new.cov = list(self.ids), self.mean.copy(), self.cov.copy()
-        new._said, new._entered = dict(self._said), dict(self._entered)
-        return new
-
-    @property
-    def zero(self) -> Array:
-        return self.mean[0]
-
-    def keep(self, things: Mapping[int, Thing]) -> bool:
-        """Enter new stays, strike out those that are over, and those whose load is another now; whether any were."""
+    def keep(self, things: Mapping[int, Thing]) -> None:
+        """Enter new stays, strike out those that are over, and enter those afresh whose load is another now."""
         gone = [i for i in self.ids if i not in things or self._another(things[i])]
         if gone:
             rows = [0, *(1 + n for n, i in enumerate(self.ids) if i not in gone)]
             self.mean, self.cov = self.mean[rows], self.cov[np.ix_(range(len(self.cov)), rows, rows)]
             self.ids = [i for i in self.ids if i not in gone]
-        new = [thing for i, thing in things.items() if i not in self.ids]
-        for thing in new:
+        for thing in [thing for i, thing in things.items() if i not in self.ids]:
             self.mean = np.vstack([self.mean, thing.load])
             size = len(self.mean)
             cov = np.zeros((len(self.cov), size, size))
             cov[:, :-1, :-1] = self.cov
-            cov[:, -1, -1] = _DEVIATIONS**2 * thing.variance + (_SHARE * np.abs(thing.load) + _GRAMS) ** 2
+            cov[:, -1, -1] = thing.variance + (_SHARE * np.abs(thing.load) + _GRAMS) ** 2
             self.cov = cov
             self.ids.append(thing.id)
             self._said[thing.id], self._entered[thing.id] = thing.load.copy(), float(thing.load.sum())
         self._entered = {i: self._entered[i] for i in self.ids}
-        self._said = {i: self._said[i] for i in self.ids}
-        for i in self.ids:
-            self._said[i] = things[i].load.copy()
-        return bool(gone or new)
+        self._said = {i: things[i].load.copy() for i in self.ids}
 
     def _another(self, thing: Thing) -> bool:
         off = np.abs(thing.load - self._said[thing.id])
         return bool((off > _CHANGED_SD * np.sqrt(thing.variance) + _CHANGED_G).any())
 
-    def walk(self, zero_g: float, share: float) -> None:
-        """Errors grow: every zero by ``zero_g``, every load by a ``share`` of itself (standard deviations)."""
-        steps = np.vstack([np.full(self.mean.shape[1], zero_g), share * np.abs(self.mean[1:])])
-        rows = np.arange(len(self.mean))
-        self.cov[:, rows, rows] += (steps**2).T
-
-    def loosen(self, grams: float) -> None:
-        """The zeros may have jumped by so much each."""
-        self.cov[:, 0, 0] += grams**2
+    def walk(self, variance: Array | float) -> None:
+        """The errors of the zeros grow by ``variance``, (k,) g^2."""
+        self.cov[:, 0, 0] += variance
 
     def expected(self, without: Collection[int] = ()) -> tuple[Array, Array]:
         """The level, (k,) g, and its variance, (k,) g^2, if the stays ``without`` were not there."""
@@ -98,7 +79,7 @@ class Ledger:
         self.cov = self.cov - gain[:, :, None] * self.cov.sum(axis=1)[:, None, :]
 
     def teach(self, things: Mapping[int, Thing]) -> None:
-        """What is known by now of each load; of things that came together the shelf knows only the sum, and keeps it."""
+        """Tell the shelf what is known by now of each load; of things that came together it keeps what it has."""
         for row, i in enumerate(self.ids, start=1):
             thing, variance = things[i], self.cov[:, row, row].copy()
             both = float(variance.sum() + thing.variance.sum())
