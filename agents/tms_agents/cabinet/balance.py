@@ -1,25 +1,25 @@
 """Mass balance: at rest the cells show their zeros and the sum of all loads. If they do not, an explanation was wrong.
 
-The zero of every cell is followed by a Kalman filter: it drifts and creeps slowly, and every thing that is taken leaves
-the error of its load behind. When the load at rest is beyond what that allows, every set of stays that may be over is
-tried, with and without one new thing, and one stay that was measured badly or slid. Tags that are read or missed count.
+Zeros drift and loads creep slowly (`ledger`). When the load at rest is beyond what that allows, every set of stays that
+may be over is tried, with and without one new thing, and one stay that was measured badly or slid. Tags count.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from tms_agents.cabinet.densities import PutDensity, balanced, normal
+from tms_agents.cabinet.densities import PutDensity, normal
 from tms_agents.cabinet.fusion import Evidence, Explanation, Kind
 from tms_agents.cabinet.geometry import Array
+from tms_agents.cabinet.ledger import Ledger
 from tms_agents.cabinet.settings import EstimatorSettings
-from tms_agents.cabinet.stays import Shelf, Thing, errors_of
+from tms_agents.cabinet.stays import Shelf, Thing
 from tms_agents.cabinet.steady import chi_square_limit
 from tms_agents.cabinet.steps import Step
 
@@ -42,8 +42,7 @@ class Balance:
 
     def __init__(self, shelf: Shelf, settings: EstimatorSettings) -> None:
         self._shelf, self._settings = shelf, settings
-        self.zero: Array | None = None
-        self.variance: Array = np.zeros(shelf.geometry.count)
+        self._ledger: Ledger | None = None
         self._seen = -math.inf
         self._off_since: float | None = None
         #: When the sum was right last.
@@ -52,53 +51,61 @@ class Balance:
         self.shaking = False
         self._whole_limit = chi_square_limit(settings.change_sd, shelf.geometry.count) / settings.change_sd**2
 
-    def removed(self, things: Sequence[Thing], now: float, *, tight: bool = True) -> None:
-        """What these things weighed was not known exactly: the zero is not, either, after they have gone."""
-        for thing in things:
-            self.variance = self.variance + thing.at(now, self._settings.creep_per_hour)
-            if not tight:
-                self.variance = self.variance + (0.02 * np.abs(thing.load) + 2.0) ** 2
+    @property
+    def known(self) -> bool:
+        return self._ledger is not None
 
     def loosen(self, grams: float) -> None:
         """The zeros may have jumped by so much each."""
-        self.variance = self.variance + grams**2
+        if self._ledger is not None:
+            self._ledger.walk(grams**2)
 
     def rest(self, now: float, level: Array, variance: Array) -> Step | None:
         """The load rests at ``level``, (k,) g: follow the zero, or return what is too much or too little."""
-        if self.zero is None:
-            self.zero, self.variance, self._seen = level - self._shelf.total(), variance + _FLOOR_G**2, now
+        if self._ledger is None:
+            self._ledger = Ledger(level - self._shelf.total(), variance + _FLOOR_G**2)
+            self._seen = now
+            self._ledger.keep(self._shelf.things)
             return None
         step = self.compare(now, now, now, level, variance)
         if not self.off(step):
             self._off_since, self.right_at = None, now
-            if self.shaking:
-                return None  # a level that swings tells nothing of the zeros
-            gain = self.variance / (self.variance + variance + _FLOOR_G**2)
-            self.zero = self.zero + gain * step.change
-            self.variance = (1 - gain) * self.variance
+            if not self.shaking:  # a level that swings tells nothing of the zeros
+                self._ledger.observe(level, variance + _FLOOR_G**2)
+                self._ledger.teach(self._shelf.things)
             return None
         if self._off_since is None:
             self._off_since = now
         if now - self._off_since > _GIVEN_UP_S:
-            self.zero, self.variance, self._off_since = level - self._shelf.total(), variance + _FLOOR_G**2, None
+            self._ledger.walk(step.change**2)
+            self._ledger.observe(level, variance + _FLOOR_G**2)
+            self._off_since = None
             return None
         return step
 
+    def faded(self) -> list[Thing]:
+        """Stays that turn out to weigh next to nothing."""
+        return [] if self._ledger is None else [self._shelf.things[i] for i in self._ledger.faded()]
+
     def compare(self, onset: float, settled: float, now: float, level: Array, variance: Array) -> Step:
         """The step from what the stays make of the zeros to ``level``."""
-        assert self.zero is not None
-        self._walk(now)
-        before = self.zero + self._shelf.total()
-        none = np.zeros((0, len(level)))
-        both = variance + self.variance + _FLOOR_G**2 + (_SHAKEN_G**2 if self.shaking else 0.0)
-        return Step(onset, settled, now, level - before, both, before, self.variance, none, none, 1.0)
-
-    def _walk(self, now: float) -> None:
-        hours = max(now - self._seen, 0.0) / 3600.0 if self._seen > -math.inf else 0.0
+        assert self._ledger is not None
+        hours = max(now - self._seen, 0.0) / 3600.0
         self._seen = now
         # Creep of what stands there: a random walk that has gone through its share of the load after an hour.
         creep = 3 * self._settings.creep_per_hour * np.abs(self._shelf.total())
-        self.variance = self.variance + (_WALK_G**2 + creep**2) * hours
+        self._ledger.walk((_WALK_G**2 + creep**2) * hours)
+        self._ledger.keep(self._shelf.things)
+        before, spread = self._ledger.expected()
+        none = np.zeros((0, len(level)))
+        both = variance + spread + _FLOOR_G**2 + (_SHAKEN_G**2 if self.shaking else 0.0)
+        return Step(onset, settled, now, level - before, both, before, spread, none, none, 1.0)
+
+    def without(self, stays: Collection[int], step: Step) -> tuple[Array, Array]:
+        """What would be left of the level of ``step``, (k,) g, were these stays over, and its variance, (k,) g^2."""
+        assert self._ledger is not None
+        expected, spread = self._ledger.expected(stays)
+        return step.before + step.change - expected, step.variance - step.before_variance + spread
 
     def off(self, step: Step) -> bool:
         total = step.weight_g**2 / float(step.variance.sum())
@@ -106,24 +113,17 @@ class Balance:
         return max(total, whole) > self._settings.change_sd**2
 
     def to_dict(self) -> dict[str, Any]:
-        return {
-            "zero": None if self.zero is None else self.zero.tolist(),
-            "variance": self.variance.tolist(),
-        }
+        return {} if self._ledger is None else self._ledger.to_dict()
 
     def restore(self, state: dict[str, Any]) -> None:
-        if state["zero"] is not None:
-            self.zero = np.array(state["zero"], dtype=float)
-            self.variance = np.array(state["variance"], dtype=float)
+        if "cov" in state:
+            self._ledger = self._before = Ledger.from_dict(state)
 
 
 def search(
-    step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings, right_at: float = -math.inf
+    step: Step, balance: Balance, shelf: Shelf, evidence: Evidence, settings: EstimatorSettings
 ) -> list[Explanation]:
-    """Explanations of ``step``, which is what the stays leave unexplained; the most probable first.
-
-    ``right_at``: what stood there when the sum was right was measured well.
-    """
+    """Explanations of ``step``, which is what the stays leave unexplained; the most probable first."""
     things = list(shelf.things.values())
     weights = [weight for weight in evidence.loose.values() if weight is not None]
     put = PutDensity(shelf.geometry, settings.min_weight_g, weights)
@@ -137,18 +137,16 @@ def search(
     if len(things) > most:
         sets.append(tuple(things))
     for those in sets:
-        left = step.change + sum((thing.load for thing in those), np.zeros_like(step.change))
-        errors, sure = errors_of(those, step.now, settings.creep_per_hour, shelf.geometry.count)
-        variance, total = step.variance + errors, float(step.variance.sum()) + sure
+        left, variance = balance.without([thing.id for thing in those], step)
         prior = sum(math.log(_OVER) + taken[thing.id] for thing in those)
         if those:
-            found.append(Explanation("take", prior + balanced(left, variance, total), removed=those))
-        score = put(left, variance, total)
+            found.append(Explanation("take", prior + normal(left, variance), removed=those))
+        score = put(left, variance)
         if score > -math.inf:
             kind: Kind = "swap" if those else "put"
             found.append(Explanation(kind, prior + math.log(_NEW) + score, removed=those, load=left))
     if settings.knows_places:
-        found += _measured_badly(step, things, spreads, taken, put, right_at)
+        found += _measured_badly(step, things, spreads, taken, put, balance.right_at)
     top = max(item.score for item in found)
     all_of_them = sum(math.exp(item.score - top) for item in found)
     ranked = sorted(found, key=lambda item: -item.score)

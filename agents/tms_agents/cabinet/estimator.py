@@ -13,6 +13,7 @@ from tms_agents.cabinet.balance import Balance, search
 from tms_agents.cabinet.blocks import Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
 from tms_agents.cabinet.caution import IN_HAND_S, Caution
+from tms_agents.cabinet.episodes import Outcome
 from tms_agents.cabinet.events import CabinetEvent, Stay, Vanished
 from tms_agents.cabinet.fusion import Evidence, Explanation, explain
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
@@ -178,13 +179,24 @@ class CabinetEstimator:
                 self._book.settling = None
                 events += revised
         step = self._balance.rest(t, level, variance)
+        if step is None:
+            events += self._nothing(t)
         if step is not None and seconds >= _CORRECT_S:
             events += self._correct(step)
         return events
 
+    def _nothing(self, t: float) -> list[CabinetEvent]:
+        """Stays that turn out to weigh nothing, unless their tags are read."""
+        events: list[CabinetEvent] = []
+        for thing in self._balance.faded():
+            if thing.tag is None or not self._presence.is_present(thing.tag):
+                del self._shelf.things[thing.id]
+                events.append(Vanished(t, thing.id, *thing.centre(self._geometry)[2:]))
+        return events
+
     def _correct(self, step: Step) -> list[CabinetEvent]:
         """The sum of the stays is not what the cells show: what is more probable?"""
-        best = search(step, self._shelf, self._recent_evidence(), self._settings, self._balance.right_at)[0]
+        best = search(step, self._balance, self._shelf, self._recent_evidence(), self._settings)[0]
         if best.kind == "unknown" or best.score < _BALANCE_SURE:
             return []
         return self._apply(step, best)
@@ -225,7 +237,7 @@ class CabinetEstimator:
             return []
         if best.kind == "unknown" and steady > _BALANCE_S and not final and whole is not None:
             self._rested = step.settled
-            other = search(whole, self._shelf, self._recent_evidence(), self._settings, self._balance.right_at)[0]
+            other = search(whole, self._balance, self._shelf, self._recent_evidence(), self._settings)[0]
             if other.kind != "unknown" and other.score > _BALANCE_SURE:
                 self._detector.accept(step)
                 return self._apply(whole, other)
@@ -239,9 +251,15 @@ class CabinetEstimator:
             return []
         odd = fits_none(best, step, self._namer.loose())
         odd = odd or self._caution.may_be_the_rest(step, best)
-        if self._settings.knows_places and (odd or (best.several and best.kind != "slide")):
+        # A slide is simple, unless something else has been brought that may stand there now.
+        several = best.several and (best.kind != "slide" or bool(self._namer.loose()))
+        if self._settings.knows_places and (odd or several):
+            outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if steady >= _VERDICT_S else None
+            if outcome is not None:
+                return self._decided(step, outcome)
             if waited < self._settings.stubborn_s:
-                return self._by_verdict(step, steady)
+                self._detector.hold(step)
+                return []
             if steady < _VERDICT_S:
                 self._detector.ignore(step)
                 return []
@@ -260,12 +278,8 @@ class CabinetEstimator:
             self._book.doubt(step, best, others)
         return self._take(step, best)
 
-    def _by_verdict(self, step: Step, steady: float) -> list[CabinetEvent]:
+    def _decided(self, step: Step, outcome: Outcome) -> list[CabinetEvent]:
         """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
-        outcome = self._hindsight.verdict(step, shaking=self._wobble.shaking) if steady >= _VERDICT_S else None
-        if outcome is None:
-            self._detector.hold(step)
-            return []
         self._detector.accept(step)
         self._rested, self._book.settling = step.settled, None
         events = self._hindsight.tell(outcome, step.now)
@@ -278,7 +292,7 @@ class CabinetEstimator:
 
     def _whole(self, step: Step) -> Step | None:
         """All that the stays and the zeros leave unexplained after ``step``, not only what is new."""
-        if self._balance.zero is None:
+        if not self._balance.known:
             return None
         level, variance = step.before + step.change, step.variance - step.before_variance
         return self._balance.compare(step.onset, step.settled, step.now, level, variance)
@@ -294,7 +308,6 @@ class CabinetEstimator:
             badly = len(explanation.removed) == 1 and explanation.kind == "take" and not explanation.tight
             weight_g = -step.weight_g if badly else at.weight_g
             self._namer.left(thing, step.settled, weight_g, at.weight_sd_g)
-        self._balance.removed(explanation.removed, step.now, tight=explanation.tight)
         self._rested = step.settled
         self._book.newest = []
         events = self._book.apply(step, explanation)

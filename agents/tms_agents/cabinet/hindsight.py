@@ -41,6 +41,10 @@ _TOLD = 8.0
 _MOST_REVISIONS = 2
 #: So long before the load changes the tag of what is brought may come into view.
 _BROUGHT_S = 3.0
+#: Log-odds that a thing was taken only after the load seemed to rest, and less with every round in which it was there.
+_LATER, _LATE = -2.0, 0.5
+#: Log-odds that the tag of what was taken is still in view, in the hand; how long that lasts; that it lasts for good.
+_IN_HAND, _HELD_S, _KEPT = math.log(0.2), 1.5, math.log(0.01)
 #: Rounds go wrong in ways of their own: no tag's evidence counts more than this.
 _MOST_ODDS = 16.0
 
@@ -103,7 +107,9 @@ class Hindsight:
             return None
         level, variance = step.before + step.change, step.variance - step.before_variance
         best = self._outcomes(self._episode, step.now, level, variance, step.settled, shaking or self._uncertain)[0]
-        return best if best.known and best.score >= _SURE_AT_ONCE else None
+        # What has been brought and is not there yet is on its way.
+        coming = self._namer.fresh(self._episode.onset - _BROUGHT_S).difference(best.new)
+        return best if best.known and best.score >= _SURE_AT_ONCE and not coming else None
 
     def tell(self, outcome: Outcome, t: float) -> list[CabinetEvent]:
         """Make the shelf what a verdict says."""
@@ -158,6 +164,7 @@ class Hindsight:
                 self._namer.weight,
                 shaking,
                 self._namer.fresh(episode.onset - _BROUGHT_S),
+                max(_IN_HAND - max(t - rested - IN_HAND_S, 0.0) / _HELD_S, _KEPT),
             ),
             self._shelf.geometry,
             self._settings.creep_per_hour,
@@ -165,10 +172,14 @@ class Hindsight:
 
     def _odds(self, tag: str, since: float) -> tuple[float, float]:
         hit, false = self._settings.read_probability, self._settings.false_read_probability
-        read, missed = self._presence.looks(tag, since)
-        there = read * math.log(hit) + missed * math.log(1 - hit)
-        gone = read * math.log(false) + missed * math.log(1 - false)
-        return float(np.logaddexp(there, -_MOST_ODDS)), float(np.logaddexp(gone, -_MOST_ODDS))
+        read = np.array(self._presence.looks(tag, since), dtype=bool)
+        there = np.where(read, math.log(hit), math.log(1 - hit))
+        gone = np.where(read, math.log(false), math.log(1 - false))
+        # A slow hand takes a light thing after the load seemed to rest: in view for some rounds more.
+        more = np.arange(len(read))
+        left = np.append(there.cumsum() - there, 0.0)[: len(read)] + gone[::-1].cumsum()[::-1] - _LATE * more
+        absent = max(float(gone.sum()), _LATER + float(left[1:].max(initial=-math.inf)))
+        return float(np.logaddexp(there.sum(), -_MOST_ODDS)), float(np.logaddexp(absent, -_MOST_ODDS))
 
     def _present(self) -> frozenset[str]:
         return frozenset(self._presence.present())

@@ -16,6 +16,8 @@ from tms_agents.cabinet.stays import Shelf, Thing
 _LEARNED_KEPT = 5000
 #: A tag that was away for so long, and came back within so long of a new thing, came with it.
 _AWAY_S, _BROUGHT_S = 2.0, 8.0
+#: Two weights are alike within so many standard deviations of both, a share, and 1 g.
+_ALIKE, _ALIKE_SHARE = 3.0, 0.005
 
 
 class Namer:
@@ -157,4 +159,6 @@ class Namer:
 
 
 def _like(one: KnownWeight, other: KnownWeight) -> bool:
-    return abs(one.mean_g - other.mean_g) < 4 * math.hypot(one.sd_g, other.sd_g) + 0.02 * other.mean_g + 1.0
+    return (
+        abs(one.mean_g - other.mean_g) < _ALIKE * math.hypot(one.sd_g, other.sd_g) + _ALIKE_SHARE * other.mean_g + 1.0
+    )

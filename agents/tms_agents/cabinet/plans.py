@@ -17,8 +17,8 @@ _CHANGES = [math.log(p) for p in (0.05, 0.75, 0.17, 0.02, 0.002, 1e-4, 1e-5)]
 _NOTHING = math.log(0.5)
 #: How often a thing is also put elsewhere when others come or go.
 _ASIDE = math.log(0.03)
-#: A new thing has a tag or none. A tag in view may belong to something else, or be in the hand that took its thing.
-_TAGGED, _UNTAGGED, _ELSEWHERE, _IN_HAND = math.log(0.8), math.log(0.2), math.log(0.03), math.log(0.2)
+#: A new thing has a tag or none. A tag in view may belong to something else,
+_TAGGED, _UNTAGGED, _ELSEWHERE = math.log(0.8), math.log(0.2), math.log(0.03)
 #: ... hardly to something else if it came into view together with the change.
 _CAME_ELSEWHERE = math.log(0.004)
 #: Up to so many things go at once, fewer where there are many.
@@ -39,6 +39,8 @@ class Known:
     shaking: bool = False
     #: Tags that came into view together with the change.
     fresh: Collection[str] = ()
+    #: Log-probability that the tag of something that was taken is still in view, in the hand.
+    in_hand: float = math.log(0.2)
 
 
 class Plan(NamedTuple):
@@ -56,7 +58,7 @@ def plans_of(things: Sequence[Thing], known: Known) -> Iterator[Plan]:
     free = [tag for tag in odds if tag not in own]
 
     def elsewhere(tag: str) -> float:
-        return _IN_HAND if tag in own else _CAME_ELSEWHERE if tag in known.fresh else _ELSEWHERE
+        return known.in_hand if tag in own else _CAME_ELSEWHERE if tag in known.fresh else _ELSEWHERE
 
     astray = {tag: max(absent, elsewhere(tag) + present) for tag, (present, absent) in odds.items()}
     unmoved = sum(odds[tag][0] for tag in sorted(own)) + sum(astray[tag] for tag in free)

@@ -91,15 +91,14 @@ class Presence:
         ]
         return sum(looks), len(looks) - sum(looks)
 
-    def looks(self, tag: str, start: float) -> tuple[int, int]:
-        """How often the tag was read and missed from ``start`` in the zone that read it most."""
+    def looks(self, tag: str, start: float) -> list[bool]:
+        """Whether the tag was read in each round from ``start``, in order, in the zone that read it most."""
         found = []
         for zone, times in self._rounds.items():
-            rounds = sum(t >= start for t in times)
             sighting = self._zones[zone].get(tag)
-            read = 0 if sighting is None else sum(seen for t, seen in sighting.rounds if t >= start)
-            found.append((read, rounds - read))
-        return max(found, default=(0, 0), key=lambda one: (one[0], -one[1]))
+            read = set() if sighting is None else {t for t, seen in sighting.rounds if seen}
+            found.append([t in read for t in times if t >= start])
+        return max(found, default=[], key=lambda one: (sum(one), -len(one)))
 
     def silent_rounds(self, tag: str, start: float) -> int:
         """Rounds from ``start`` until the tag was first read in this visit, in the zone that read it first."""
