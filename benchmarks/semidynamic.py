@@ -2,6 +2,7 @@
 
     python benchmarks/semidynamic.py                                    some minutes on one core
     python benchmarks/semidynamic.py --worlds short --drives 30:31 --seeds 1
+    python benchmarks/semidynamic.py --worlds short --picture docs/semidynamic_paper.png
 
 Times are CPU time of one core: of the paper's filter per update (one detection of one tag, the rewriting of the grid
 included), of our method for all objects and the map. The paths, the same for all, are not in them.
@@ -19,6 +20,7 @@ from typing import Any, get_args
 
 import numba
 import numpy as np
+from semidynamic_pictures import first_pass, panels
 from semidynamic_scores import Scores, scores
 
 from tms_agents.simulation.semidynamic_drive import record
@@ -47,12 +49,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--worlds", default="short,clutter,room")
     parser.add_argument("--drives", default="30:30", metavar="FIRST:LAST", help="seeds of the worlds")
     parser.add_argument("--seeds", type=int, default=3, metavar="N", help="of the paper's filter, each")
+    parser.add_argument("--picture", type=Path, metavar="PNG", help="of the first world and seed, no table")
     args = parser.parse_args(arguments)
     worlds = args.worlds.split(",")
     if unknown := set(worlds) - set(PLANS):
         parser.error(f"unknown: {', '.join(sorted(unknown))}")
     first, _, last = args.drives.partition(":")
     numba.set_num_threads(1)
+    if args.picture:
+        with tempfile.TemporaryDirectory() as folder:
+            record(worlds[0], int(first), Path(folder))
+            picture(Path(folder), args.picture)
+        return
     print("| world, seed | method | right | found | doors wrong | ghosts | ms per update, median (worst) | s in all |")
     print("|---|---|---|---|---|---|---|---|")
     warm = True
@@ -65,9 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def rows(name: str, folder: Path, seeds: int, warm: bool) -> None:
-    log = read_log(folder / "stream.jsonl.gz")
-    rounds, _ = parse_rounds(lines_of_file(folder / "stream.jsonl.gz"))
-    models = parse_models((folder / "models.json").read_text())
+    log, rounds, models = _read(folder)
     truth = json.loads((folder / "truth.json").read_text())
     poses = robot_path(log, Settings())
     if warm:  # what is compiled at its first use is not measured
@@ -87,6 +93,21 @@ def rows(name: str, folder: Path, seeds: int, warm: bool) -> None:
         ms = 1000 * np.concatenate(updates)
         told = [scores(log, models, truth, result) for result in found]
         _row(name, f"paper, {pose_of}", told, f"{np.median(ms):.1f} ({ms.max():.1f})", spent)
+
+
+def picture(folder: Path, path: Path) -> None:
+    log, rounds, models = _read(folder)
+    poses = robot_path(log, Settings())
+    before, _ = _paper(*first_pass(log, poses, rounds), models, "mean", 0)
+    after, _ = _paper(log, poses, rounds, models, "mean", 0)
+    ours = _default(log, poses, rounds, models)
+    panels(path, models, [("paper, first pass", before), ("paper, last pass", after), ("default, last pass", ours)])
+
+
+def _read(folder: Path) -> tuple[Log, Rounds, Models]:
+    log = read_log(folder / "stream.jsonl.gz")
+    rounds, _ = parse_rounds(lines_of_file(folder / "stream.jsonl.gz"))
+    return log, rounds, parse_models((folder / "models.json").read_text())
 
 
 def _default(log: Log, poses: Floats, rounds: Rounds, models: Models) -> Semidynamic:
