@@ -19,7 +19,6 @@ from tms_agents.slam.semidynamic import (
     PaperSettings,
     Rounds,
     Semidynamic,
-    map_with_filters,
     map_with_objects,
     parse_models,
     parse_rounds,
@@ -52,12 +51,8 @@ def semidynamic(arguments: argparse.Namespace) -> int:
     log, rounds, models = _read(arguments)
     make_folder(arguments.out)
     began = time.perf_counter()
-    settings = Settings(seed=arguments.seed)
-    if arguments.method == "paper":
-        paper = PaperSettings(pose_of=arguments.pose_of or PaperSettings().pose_of)
-        result = map_with_filters(log, rounds, models, settings, paper)
-    else:
-        result = map_with_objects(log, rounds, models, settings)
+    paper = PaperSettings(pose_of=arguments.pose_of or "mean") if arguments.method == "paper" else None
+    result = map_with_objects(log, rounds, models, Settings(seed=arguments.seed), paper=paper)
     seconds = time.perf_counter() - began
     write_trajectory(arguments.out / "trajectory.txt", log.t, result.poses)
     write_map(arguments.out, result.grid, result.poses)

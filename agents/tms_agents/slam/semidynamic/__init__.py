@@ -2,7 +2,7 @@
 
 from tms_agents.slam.semidynamic.models import Antenna, Models, ObjectModel, parse_models
 from tms_agents.slam.semidynamic.paper import PaperSettings, PoseOf
-from tms_agents.slam.semidynamic.pipeline import Semidynamic, map_with_filters, map_with_objects, robot_path
+from tms_agents.slam.semidynamic.pipeline import Semidynamic, map_with_objects, robot_path
 from tms_agents.slam.semidynamic.reads import Rounds, parse_rounds
 from tms_agents.slam.semidynamic.solving import Stay
 from tms_agents.slam.semidynamic.visits import Visit
@@ -17,7 +17,6 @@ __all__ = [
     "Semidynamic",
     "Stay",
     "Visit",
-    "map_with_filters",
     "map_with_objects",
     "parse_models",
     "parse_rounds",

@@ -38,26 +38,17 @@ def map_with_objects(
     settings: Settings,
     resolution: float = RESOLUTION_M,
     progress: Callable[[Progress], None] = lambda _: None,
+    paper: PaperSettings | None = None,
 ) -> Semidynamic:
-    """The mapper's path, polished; the objects, given that path; the map without what has gone."""
+    """The mapper's path, polished; the objects, given that path; the map without what has gone.
+
+    With ``paper`` objects and map as the paper has them: particles per detected tag, a grid that is rewritten."""
     poses = robot_path(log, settings, progress)
+    if paper is not None:
+        found = follow(log, poses, rounds, models, paper, settings.seed, resolution)
+        return Semidynamic(poses, found.stays, found.grid)
     stays = solve(log, poses, rounds, odometry_at(log.t, poses, rounds.t), models, settings.seed)
     return Semidynamic(poses, stays, draw(log, poses, stays, models, resolution))
-
-
-def map_with_filters(
-    log: Log,
-    rounds: Rounds,
-    models: Models,
-    settings: Settings,
-    paper: PaperSettings,
-    resolution: float = RESOLUTION_M,
-    progress: Callable[[Progress], None] = lambda _: None,
-) -> Semidynamic:
-    """The same path; objects and map as the paper has them: particles per detected tag, a grid that is rewritten."""
-    poses = robot_path(log, settings, progress)
-    found = follow(log, poses, rounds, models, paper, settings.seed, resolution)
-    return Semidynamic(poses, found.stays, found.grid)
 
 
 def robot_path(log: Log, settings: Settings, progress: Callable[[Progress], None] = lambda _: None) -> Floats:

@@ -18,5 +18,6 @@ def residual(weights: Floats, random: np.random.Generator) -> NDArray[np.int64]:
     missing = count - len(parents)
     if missing <= 0:
         return parents[:count]
-    rests = np.maximum(wanted - certain, 0.0)
-    return np.concatenate([parents, random.choice(count, missing, p=rests / rests.sum())])
+    shares = np.cumsum(np.maximum(wanted - certain, 0.0))
+    drawn = np.searchsorted(shares / shares[-1], random.uniform(size=missing), side="right")
+    return np.concatenate([parents, drawn])

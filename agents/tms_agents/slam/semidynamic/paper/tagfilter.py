@@ -101,7 +101,7 @@ class TagFilter:
 
 def in_range(antenna: Antenna, seen_from: Floats, count: int, random: np.random.Generator) -> Floats:
     """(count, 3) poses of a tag, uniform over the range of an antenna at ``seen_from`` (3,), turned anyhow."""
-    distance = antenna.reach * _FARTHER * np.sqrt(random.random(count))
+    distance = antenna.reach * _FARTHER * np.sqrt(random.uniform(size=count))
     bearing = min(antenna.half_beam * _WIDER, np.pi) * random.uniform(-1, 1, count)
     turn = random.uniform(-np.pi, np.pi, count)
     there = np.column_stack([distance * np.cos(bearing), distance * np.sin(bearing), turn])
