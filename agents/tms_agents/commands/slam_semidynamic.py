@@ -14,7 +14,15 @@ import numpy as np
 from tms_agents.commands.slam_log import make_folder
 from tms_agents.slam.export import write_map, write_trajectory
 from tms_agents.slam.logs import Log, LogError, lines_of_file, read_log
-from tms_agents.slam.semidynamic import Models, Rounds, Semidynamic, map_with_objects, parse_models, parse_rounds
+from tms_agents.slam.semidynamic import (
+    Models,
+    PaperSettings,
+    Rounds,
+    Semidynamic,
+    map_with_objects,
+    parse_models,
+    parse_rounds,
+)
 from tms_agents.slam.settings import Settings
 from tms_client.cli import CommandError
 
@@ -24,16 +32,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
     parser.add_argument("--models", type=Path, metavar="MODELS.json", help="default: models.json beside RECORDING")
     parser.add_argument("--seed", type=int, default=0, metavar="S")
+    parser.add_argument(
+        "--method", choices=("default", "paper"), default="default", help="paper: a particle filter per detected tag"
+    )
+    parser.add_argument(
+        "--pose-of",
+        choices=("heaviest", "mean"),
+        help="with --method paper: the heaviest particle where N_eff was largest, or the mean (default: mean)",
+    )
     parser.set_defaults(work=semidynamic)
 
 
 def semidynamic(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise CommandError("--seed: not negative")
+    if arguments.pose_of and arguments.method != "paper":
+        raise CommandError("--pose-of: only with --method paper")
     log, rounds, models = _read(arguments)
     make_folder(arguments.out)
     began = time.perf_counter()
-    result = map_with_objects(log, rounds, models, Settings(seed=arguments.seed))
+    paper = PaperSettings(pose_of=arguments.pose_of or "mean") if arguments.method == "paper" else None
+    result = map_with_objects(log, rounds, models, Settings(seed=arguments.seed), paper=paper)
     seconds = time.perf_counter() - began
     write_trajectory(arguments.out / "trajectory.txt", log.t, result.poses)
     write_map(arguments.out, result.grid, result.poses)

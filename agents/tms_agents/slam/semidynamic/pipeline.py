@@ -12,6 +12,7 @@ from tms_agents.slam.mapping import Progress, build_map
 from tms_agents.slam.polishing import polish
 from tms_agents.slam.semidynamic.drawing import draw
 from tms_agents.slam.semidynamic.models import Models
+from tms_agents.slam.semidynamic.paper import PaperSettings, follow
 from tms_agents.slam.semidynamic.reads import Rounds
 from tms_agents.slam.semidynamic.solving import Stay, solve
 from tms_agents.slam.settings import Settings
@@ -37,13 +38,20 @@ def map_with_objects(
     settings: Settings,
     resolution: float = RESOLUTION_M,
     progress: Callable[[Progress], None] = lambda _: None,
+    paper: PaperSettings | None = None,
 ) -> Semidynamic:
-    """The mapper's path, polished; the objects, given that path; the map without what has gone."""
-    poses = polish(log, build_map(log, settings, progress).poses, settings.noise)
-    poses = _from_origin(poses)
+    """The mapper's path, polished; the objects, given that path; the map without what has gone.
+
+    With ``paper`` objects and map as the paper has them: particles per detected tag, a grid that is rewritten."""
+    poses = robot_path(log, settings, progress)
+    if paper is not None:
+        found = follow(log, poses, rounds, models, paper, settings.seed, resolution)
+        return Semidynamic(poses, found.stays, found.grid)
     stays = solve(log, poses, rounds, odometry_at(log.t, poses, rounds.t), models, settings.seed)
     return Semidynamic(poses, stays, draw(log, poses, stays, models, resolution))
 
 
-def _from_origin(poses: Floats) -> Floats:
+def robot_path(log: Log, settings: Settings, progress: Callable[[Progress], None] = lambda _: None) -> Floats:
+    """(S, 3) the mapper's path, polished, the first pose at the origin."""
+    poses = polish(log, build_map(log, settings, progress).poses, settings.noise)
     return between(poses[:1], poses)
