@@ -15,11 +15,15 @@ ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text()
 ADDRESS = "http://127.0.0.1:8080"
 
-COMMANDS = [
-    (command, output)
-    for block in re.findall(r"```console\n(.*?)```", README, re.DOTALL)
-    for command, output in re.findall(r"^\$ (.*?)\n(.*?)(?=^\$ |\Z)", block, re.DOTALL | re.MULTILINE)
-]
+COMMANDS = sorted(
+    (
+        (command, output)
+        for block in re.findall(r"```console\n(.*?)```", README, re.DOTALL)
+        for command, output in re.findall(r"^\$ (.*?)\n(.*?)(?=^\$ |\Z)", block, re.DOTALL | re.MULTILINE)
+    ),
+    # Questions first: while another demo runs beside it for minutes, people in the room that is asked walk on.
+    key=lambda item: item[0].startswith("tms demo"),
+)
 PROGRAMS = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", README, re.DOTALL)
 
 
@@ -93,16 +97,16 @@ def test_the_readme_has_snippets() -> None:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize(("command", "output"), COMMANDS, ids=[command for command, _ in COMMANDS])
-def test_commands(demo: str, command: str, output: str) -> None:
-    assert_like(output, run(["sh", "-c", command], demo))
-
-
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("program", "output"), PROGRAMS, ids=["where"])
 def test_programs(demo: str, program: str, output: str) -> None:
     assert ADDRESS in program
     assert_like(output, run([sys.executable, "-c", program.replace(ADDRESS, demo)], demo))
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(("command", "output"), COMMANDS, ids=[command for command, _ in COMMANDS])
+def test_commands(demo: str, command: str, output: str) -> None:
+    assert_like(output, run(["sh", "-c", command], demo))
 
 
 def test_links_lead_somewhere() -> None:
