@@ -1,0 +1,210 @@
+"""What is due for each body, scan by scan: is it believed, lost, back, gone, furniture, or one foot of somebody?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.bodies import misled
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
+from tms_agents.floor.gait import SHOES
+
+Array = NDArray[np.float64]
+
+#: What `review` finds of a body.
+NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
+#: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
+_LONE_S = 4.0
+#: Where the other foot was last seen, within this (m), and it may be hidden, time counts by this share.
+_BEHIND, _STEP_M = 0.2, 0.1
+#: What had stood there for so long (s) before somebody's only foot came there is most likely a thing: time counts more.
+_OLDER_S, _FASTER = 1.0, 2.5
+#: Nobody stands for so long (s) without shifting a foot.
+_STILL_S = 40.0
+#: What was pushed stands still for so long (s): it is furniture.
+_PARKED_S = 5.0
+#: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
+#: seen in this share of the scans at least.
+_BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
+#: What moved with people beside it for this share of its way may have been pushed.
+_BESIDE = 0.15
+#: Who stays within this (m) rests.
+_REST_M = 0.15
+#: How much what is seen of a mover must look like feet (`footlike`) in the long run.
+_QUALITY = 0.3
+#: Who was seen so often is somebody.
+_KNOWN = 200
+#: Nobody stands with the feet so far apart (m) for long.
+_ASTRIDE_M = 0.48
+#: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
+_SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
+#: A mover is told again when it has moved so far (m).
+_TELL_M = 0.05
+
+
+@njit(cache=True)
+def _is_lone(body: Any, t: float) -> bool:
+    """Whether of a person only one thing is seen, or two too far apart to stand on, unmoved for some time."""
+    if body.robot or body.wide > 0.6 or body.width > 0.2:
+        return False
+    a, b = t - body.a_seen, t - body.b_seen
+    apart = np.hypot(body.ax - body.bx, body.ay - body.by)
+    sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
+    astride = max(a, b) < 0.5 and apart > _ASTRIDE_M and t - max(body.a_since, body.b_since) > 1.5
+    if body.still > _STILL_S or sliver or astride:
+        return True
+    since = body.a_since if a < b else body.b_since
+    return bool(max(a, b) > 1.0 and t - since > 1.0)
+
+
+@njit(cache=True)
+def _is_parked(body: Any, t: float) -> bool:
+    """Whether it is as wide as furniture, has never gone far by itself, and stands still."""
+    if body.machine:
+        return False
+    since = body.a_since if body.a_seen >= body.b_seen else body.b_since
+    if body.wide > 0.5:
+        return bool(t - since > _PARKED_S)
+    if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
+        # It came by itself.
+        return False
+    # Furniture half hidden by who pushes it: as broad as no leg or shoe, or broad once and hardly ever on two feet.
+    rests = t - body.rest_at
+    broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
+    return bool((broad and rests > _PARKED_S) or (is_footless(body) and rests > 2.0 * _PARKED_S))
+
+
+@njit(cache=True)
+def _is_known(body: Any) -> bool:
+    """Whether two feet have been seen so often that it is a person."""
+    return bool(body.hits > _KNOWN and body.both > _FEET * body.hits)
+
+
+@njit(cache=True)
+def is_footless(body: Any) -> bool:
+    """Whether it has been broader than two feet side by side, and two feet were hardly ever seen."""
+    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits)
+
+
+@njit(cache=True)
+def _accompanied(bodies: Any, b: int, t: float) -> bool:
+    """Whether a person is so near something wide that it may be pushed."""
+    for o in range(bodies.size):
+        other = bodies[o]
+        person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < 0.5
+        if person and np.hypot(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
+            return True
+    return False
+
+
+@njit(cache=True)
+def review(
+    bodies: Any,
+    t: float,
+    dt: float,
+    ranges: Array,
+    states: NDArray[np.int8],
+    longest: Array,
+    pose: Array,
+    first: float,
+    step: float,
+    confirm_s: float,
+    confirm_m: float,
+    leave_s: float,
+    hidden_s: float,
+    stale_s: float,
+    actions: NDArray[np.int64],
+    inside: bool,
+    learned: bool,
+) -> None:
+    """What is due for each body, into ``actions``; drops tentative ones that came to nothing."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        actions[b] = NOTHING
+        if not body.used:
+            continue
+        unseen = t - body.seen
+        if (body.wide > 0.3 or body.far > _FAR_M) and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
+            body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
+        if unseen == 0.0 and np.hypot(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
+            body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
+        if not body.confirmed:
+            way = np.hypot(body.x - body.x0, body.y - body.y0)
+            age = body.seen - body.first
+            parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
+            if unseen > 0.45 or (age > 3.0 and way < 0.15) or parked or body.hits < 0.5 * body.looks - 1.0:
+                body.used = 0
+                continue
+            if unseen > 0.0:
+                continue
+            beside, halved, part = np.inf, False, False
+            for o in range(bodies.size):
+                if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
+                    away = np.hypot(bodies[o].x - body.x, bodies[o].y - body.y)
+                    beside = min(beside, away)
+                    # A part of somebody who is wide: legs that are one thing to the laser fall apart now and then.
+                    part = part or away < 0.12 + 0.5 * bodies[o].width
+                    # One foot of somebody there is not seen now: this may be it.
+                    if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
+                        halved = True
+            if part:
+                body.used = 0
+                continue
+            needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
+            needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
+            if halved:
+                needed_s = 8.0 * confirm_s
+            if not learned:
+                needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
+            if body.wide > 0.5:
+                # Furniture that is pushed aside looks like a robot at first.
+                needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
+            if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= max(3.0, 0.45 * body.hits):
+                actions[b] = CONFIRM
+            continue
+        if unseen == 0.0:
+            only_a = body.a_seen >= body.b_seen
+            foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
+            if _is_lone(body, t):
+                x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
+                behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
+                if body.lone == 0.0:
+                    body.lone_x, body.lone_y = foot_x, foot_y
+                if body.older > _OLDER_S:
+                    body.lone += dt * _FASTER
+                else:
+                    body.lone += dt * (_BEHIND if behind else 1.0)
+            elif (
+                max(t - body.a_seen, t - body.b_seen) < 1.0
+                or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
+            ):
+                # What was hidden meanwhile goes on being alone.
+                body.lone = 0.0
+            single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
+            body.single = body.single + dt if single else 0.0
+            if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
+                # One thing that does not move is no person: whoever it was is somewhere else.
+                actions[b] = LOST
+            elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
+                # Somebody who is known for long has gone on from there.
+                actions[b] = LOST if _is_known(body) else GONE
+            elif body.stale:
+                actions[b] = BACK
+            elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
+                actions[b] = MOVED
+            continue
+        if unseen > 0.12:
+            view = clear(body.x, body.y, 0.15, ranges, states, longest, pose, first, step)
+            if view == FREE:
+                body.clear += dt
+            elif view == UNSEEN or (view == WALLED and not inside):
+                body.clear += 0.5 * dt
+            elif view == HIDDEN:
+                body.clear = max(0.0, body.clear - 0.5 * dt)
+        if body.clear > leave_s or unseen > hidden_s:
+            actions[b] = GONE
+        elif unseen > stale_s and not body.stale:
+            actions[b] = LOST
