@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from tms_agents.devices.beat import on_the_beat
-from tms_agents.devices.sessions import Asking, DeviceState, Noted, Paced, Polled, Session
+from tms_agents.devices.sessions import Asking, DeviceState, Noted, Paced, Polled, Prompt, Session
 from tms_agents.devices.streams import Stream
 from tms_agents.devices.waiting import Watch, watch
 
@@ -45,6 +45,7 @@ class Conversation(Generic[T]):
         self._tick_s, self._gather_s = tick_s, gather_s
         self._paced = session if isinstance(session, Paced) else None
         self._polled = isinstance(session, Polled)
+        self._prompt: Prompt[T] | None = session if isinstance(session, Prompt) else None
         self._asking: Asking[T] | None = session if isinstance(session, Asking) else None
         self._noted, self._note = (session if isinstance(session, Noted) else None), ""
         self._heard: list[Sequence[T] | DeviceState] = []
@@ -99,6 +100,8 @@ class Conversation(Generic[T]):
         try:
             now = self._loop.time()
             if (asking := self._asking) is None:
+                if self._prompt is not None:
+                    self._prompt.prompt = self._gather_s() <= 0
                 self._take(now, self._stream.read() if readable or self._polled else None)
             elif not (data := self._stream.read()):
                 asking.prompt = self._gather_s() <= 0
@@ -152,7 +155,7 @@ class Conversation(Generic[T]):
         if items:
             self._add(items)
         session.tick()
-        if self._asking is not None and (items := self._asking.finished()):
+        if self._prompt is not None and (items := self._prompt.finished()):
             self._add(items)
         if output := session.output():
             self._stream.write(output)

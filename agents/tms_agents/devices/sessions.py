@@ -71,11 +71,19 @@ class Polled(Paced, Protocol):
 
 
 @runtime_checkable
-class Asking(Protocol[T_co]):
-    """A session that asks one question after the other, quickly: short ways for what happens most of the time."""
+class Prompt(Protocol[T_co]):
+    """A session that can have its readings earlier where they are waited for."""
 
     #: Somebody waits for every reading: it may cost more to have it early.
     prompt: bool
+
+    def finished(self) -> Sequence[T_co]:
+        """Readings that were completed by a tick; each is given out once, here or by ``receive``."""
+
+
+@runtime_checkable
+class Asking(Prompt[T_co], Protocol[T_co]):
+    """A session that asks one question after the other, quickly: short ways for what happens most of the time."""
 
     def answered(self, data: bytes) -> bytes | None:
         """What to send, if anything, when ``data`` is just the answer that was waited for.
@@ -85,6 +93,3 @@ class Asking(Protocol[T_co]):
 
     def nothing_by(self, now: float) -> None:
         """At a look at the line after ``now``, time of the session's clock, nothing was there. A tick follows."""
-
-    def finished(self) -> Sequence[T_co]:
-        """Readings that were completed by a tick; each is given out once, here or by ``receive``."""

@@ -21,11 +21,13 @@ from tms_agents.devices.transport import DeviceFault
 
 #: Spoiled rounds in a row after which the board is called faulty.
 _MOST_SPOILED = 10
+#: Where readings are waited for, the line is looked at so often, and quiet after this share of it.
+_LOOK_S, _QUIET = 0.004, 0.7
 
 
 class RosTmsBoardBurst(Outgoing):
     """Delivers a ``LoadSample`` of counts per round, one on every beat of ``period_s`` seconds (``devices.beat``), one
-    round late.
+    round late; while it is to be ``prompt``, as soon as the line is quiet behind the answers.
 
     ``reply_s``: answers later than this spoil the round; ``quiet_s``: pause after a spoiled one.
 
@@ -34,6 +36,7 @@ class RosTmsBoardBurst(Outgoing):
     """
 
     polled = True
+    prompt = False
 
     def __init__(
         self,
@@ -60,8 +63,12 @@ class RosTmsBoardBurst(Outgoing):
         self._numbers: list[float] = []
         self._asked_at: float | None = None
         self._quiet_since: float | None = clock()  # what a former host asked for is thrown away first
+        #: A round that may still be spoiled by what comes, and since when it is there; rounds to be given out.
         self._complete: LoadSample | None = None
-        self._spoiled, self._got = 0, 0
+        self._complete_at = 0.0
+        self._done: list[LoadSample] = []
+        self._next_round = 0.0
+        self._spoiled = 0
 
     def opened(self) -> None:
         self._quiet_since = self._clock()
@@ -81,23 +88,33 @@ class RosTmsBoardBurst(Outgoing):
             return []
         if len(self._numbers) == self._cells and not self._lines.pending:
             return self._whole(tuple(self._numbers))
-        done = [] if self._complete is None else [self._complete]
-        self._complete = None
-        return done
+        self._hand_out()
+        return self.finished()
 
     def _whole(self, values: tuple[float, ...]) -> list[LoadSample]:
         """A round; what is handed out is the one before it, beside which nothing has come meanwhile."""
-        done = [] if self._complete is None else [self._complete]
-        self._complete = LoadSample(values=values)
+        self._hand_out()
+        self._complete, self._complete_at = LoadSample(values=values), self._clock()
         self._numbers, self._asked_at, self._spoiled = [], None, 0
         self.frames += self._cells
         self.ready = True
+        return self.finished()
+
+    def _hand_out(self) -> None:
+        if self._complete is not None:
+            self._done.append(self._complete)
+            self._complete = None
+
+    def finished(self) -> list[LoadSample]:
+        done, self._done = self._done, []
         return done
 
     @property
     def tick_s(self) -> float:
         now = self._clock()
-        return next_moment(now, self._period_s) - now
+        wait_s = next_moment(now, self._period_s) - now
+        under_way = self._asked_at is not None or self._complete is not None
+        return min(wait_s, _LOOK_S) if self.prompt and under_way else wait_s
 
     def tick(self) -> None:
         now = self._clock()
@@ -106,11 +123,14 @@ class RosTmsBoardBurst(Outgoing):
                 return
             self._lines.expire()
             self._quiet_since = None
-        if self._asked_at is None:
-            self._asked_at = now
+        if self.prompt and now - self._complete_at > _QUIET * _LOOK_S:
+            self._hand_out()
+        if self._asked_at is not None:
+            if now - self._asked_at > self._reply_s:
+                self._spoil()
+        elif (following := next_moment(now, self._period_s)) != self._next_round:
+            self._asked_at, self._next_round = now, following
             self._output += INDEX[: self._cells].encode()
-        elif now - self._asked_at > self._reply_s:
-            self._spoil()
 
     @property
     def pending(self) -> int:
@@ -119,7 +139,7 @@ class RosTmsBoardBurst(Outgoing):
 
     def _spoil(self) -> None:
         answered = len(self._numbers)
-        self._numbers, self._asked_at, self._complete = [], None, None
+        self._numbers, self._asked_at, self._complete, self._next_round = [], None, None, 0.0
         self._quiet_since = self._clock()
         # Silence is for the link to judge.
         self._spoiled += bool(answered)

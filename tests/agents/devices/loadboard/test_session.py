@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tms_agents.devices.loadboard import RosTmsBoardBurst, RosTmsBoardSession
 from tms_agents.devices.loadboard.emulator import RosTmsBoardDevice
-from tms_agents.devices.sessions import Asking
+from tms_agents.devices.sessions import Asking, Prompt
 from tms_agents.devices.transport import DeviceFault
 
 #: Every cell has values that no other cell has, so that a mix-up shows.
@@ -43,8 +43,8 @@ class Wire:
         self.session.opened()
         self.noise = self.arrived = self.said = b""
         self.short = self.ways != "plain" and isinstance(self.session, Asking)
-        if self.short:
-            self.session.prompt = self.ways == "prompt"
+        if self.ways == "prompt":
+            self.session.prompt = True
         self.due = 0.0
 
     def run(self, seconds: float, latency_s=lambda: 0.0) -> list:
@@ -69,7 +69,7 @@ class Wire:
                     samples += self.session.receive(self.arrived)
                     self.arrived = b""
                 self.session.tick()
-                if self.short:
+                if isinstance(self.session, Prompt):
                     samples += self.session.finished()
                 if self.session.tick_s > 0:
                     break
@@ -208,6 +208,19 @@ def test_asked_all_at_once_every_firmware_is_read_fifty_times_a_second(firmware)
     samples = Wire({"firmware": firmware}, kind=RosTmsBoardBurst).run(3.0, lambda: 0.003)
     assert 85 <= len(samples) <= 100 and right(samples)  # after a second of quiet
     assert not any(math.isnan(value) for sample in samples for value in sample.values)
+
+
+def test_asked_all_at_once_a_round_is_told_late_unless_somebody_waits_for_it():
+    def delays(prompt: bool) -> list[float]:
+        wire, late = Wire(kind=RosTmsBoardBurst), []
+        wire.session.prompt = prompt
+        wire.run(1.2)
+        for _ in range(1000):
+            late += [wire.now - (sample.values[0] - CELLS[0]) / 50 for sample in wire.run(0.001, lambda: 0.003)]
+        return late
+
+    # The value counts fiftieths of a second, so a delay is known to 0.02 s.
+    assert 0.03 < min(delays(False)) and max(delays(True)) < 0.035
 
 
 @settings(max_examples=30, deadline=None)
