@@ -25,6 +25,8 @@ from tms_agents.cabinet.steps import Step
 
 #: Prior odds: a stay is over and nobody told, a thing is there and nobody told, a stay was measured badly, or slid.
 _OVER, _NEW, _MEASURED, _LATE_MEASURED, _SLID = 0.02, 0.05, 0.05, 0.003, 1e-3
+#: The tag of something new was left with a stay that is over; weights are spread over so many g, and told so well.
+_MISNAMED, _WEIGHTS_G, _ALIKE_G = 0.02, 500.0, 1.0
 #: ... something else, and that the zeros have moved by some grams.
 _UNKNOWN, _MOVED, _MOVED_G = 1e-3, 0.02, 8.0
 #: The zero moves by so much per square root of an hour, a resting level is never better known than this, g.
@@ -60,8 +62,11 @@ class Balance:
         if self._ledger is not None:
             self._ledger.walk(grams**2)
 
-    def rest(self, now: float, level: Array, variance: Array) -> Step | None:
-        """The load rests at ``level``, (k,) g: follow the zero, or return what is too much or too little."""
+    def rest(self, now: float, level: Array, variance: Array, measured: int | None = None) -> Step | None:
+        """The load rests at ``level``, (k,) g: follow the zero, or return what is too much or too little.
+
+        ``measured``: the stay whose load is being measured by the same rest.
+        """
         if self._ledger is None:
             self._ledger = Ledger(level - self._shelf.total(), variance + _FLOOR_G**2)
             self._seen = now
@@ -72,7 +77,7 @@ class Balance:
             self._off_since, self.right_at = None, now
             if not self.shaking:  # a level that swings tells nothing of the zeros
                 self._ledger.observe(level, variance + _FLOOR_G**2)
-                self._ledger.teach(self._shelf.things)
+                self._ledger.teach(self._shelf.things, measured)
             return None
         if self._off_since is None:
             self._off_since = now
@@ -117,7 +122,7 @@ class Balance:
 
     def restore(self, state: dict[str, Any]) -> None:
         if "cov" in state:
-            self._ledger = self._before = Ledger.from_dict(state)
+            self._ledger = Ledger.from_dict(state)
 
 
 def search(
@@ -145,12 +150,27 @@ def search(
         if score > -math.inf:
             kind: Kind = "swap" if those else "put"
             found.append(Explanation(kind, prior + math.log(_NEW) + score, removed=those, load=left))
+    found += _misnamed(step, balance, things)
     if settings.knows_places:
         found += _measured_badly(step, things, spreads, taken, put, balance.right_at)
     top = max(item.score for item in found)
     all_of_them = sum(math.exp(item.score - top) for item in found)
     ranked = sorted(found, key=lambda item: -item.score)
     return [replace(item, score=math.exp(item.score - top) / all_of_them) for item in ranked]
+
+
+def _misnamed(step: Step, balance: Balance, things: Sequence[Thing]) -> list[Explanation]:
+    """Its tag is read, but from where a thing without one has come since then: the same thing, moved."""
+    found = []
+    for old in [thing for thing in things if thing.tag is not None and not thing.joint]:
+        left, variance = balance.without([old.id], step)
+        score = math.log(_OVER * _MISNAMED) + normal(left, variance)
+        for new in [thing for thing in things if thing.tag is None and thing.since > old.since and not thing.joint]:
+            apart = float((new.load - old.load).sum())
+            sd = math.sqrt(float((new.variance + old.variance).sum())) + _ALIKE_G
+            alike = math.log(_WEIGHTS_G / sd) - 0.5 * (apart / sd) ** 2
+            found.append(Explanation("take", score + alike, removed=(old,), thing=new))
+    return found
 
 
 def _measured_badly(

@@ -157,8 +157,8 @@ class Bookkeeper:
     def rest(self, now: float, level: Array, variance: Array, since: float) -> list[CabinetEvent]:
         """The load has rested at ``level`` from ``since`` on: sharpen the thing that was put last."""
         settling = self.settling
-        if settling is None or now - settling.posted > self._settings.refine_until_s or since > settling.posted:
-            return []  # or another change has come, which was not its
+        if settling is None or self.measured(now, since) is None:
+            return []
         thing = settling.thing
         thing.load, thing.variance = level - settling.before, variance + settling.variance
         thing.load = thing.load + _sway(thing)
@@ -174,6 +174,13 @@ class Bookkeeper:
             return []
         settling.looked = True
         return self._tell(thing, now)
+
+    def measured(self, now: float, since: float) -> int | None:
+        """The stay that is sharpened while the load rests as it has ``since`` then."""
+        settling = self.settling
+        if settling is None or now - settling.posted > self._settings.refine_until_s or since > settling.posted:
+            return None  # or another change has come, which was not its
+        return settling.thing.id
 
     def _tell(self, thing: Thing, now: float, *, always: bool = False) -> list[CabinetEvent]:
         at = thing.centre(self._shelf.geometry)

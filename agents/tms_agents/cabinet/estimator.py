@@ -29,6 +29,8 @@ from tms_agents.cabinet.wobble import Wobble
 
 #: An unclear level that the load left sooner than this was one in passing.
 _PASSING_S = 0.8
+#: ... and one that is not longer, and explained with no more than this probability.
+_GUESS_S, _GUESS = 2.5, 0.9
 #: How long the load must rest before its sum is believed, and before what it says is corrected (everything since the
 #: last rest has been looked at by then), and how sure another explanation must be.
 _BALANCE_S, _CORRECT_S, _BALANCE_SURE = 1.0, 4.0, 0.9
@@ -178,7 +180,7 @@ class CabinetEstimator:
             if revised:
                 self._book.settling = None
                 events += revised
-        step = self._balance.rest(t, level, variance)
+        step = self._balance.rest(t, level, variance, self._book.measured(t, self._detector.since))
         if step is None:
             events += self._nothing(t)
         if step is not None and seconds >= _CORRECT_S:
@@ -271,7 +273,10 @@ class CabinetEstimator:
         if (unsure and waited < patience) or (part and waited < _PART_S):
             self._detector.hold(step)
             return []
-        if final and (arm or (part and steady < _PART_S) or (steady < _PASSING_S and (unsure or best.several))):
+        passing = steady < _PASSING_S and (unsure or best.several)
+        # The load went on: rather all of a slow change than a guess at a part of it.
+        passing = passing or (steady < _GUESS_S and best.score < _GUESS)
+        if final and (arm or (part and steady < _PART_S) or passing):
             self._detector.ignore(step)
             return []
         if best.kind == "slide":
@@ -313,6 +318,8 @@ class CabinetEstimator:
         events = self._book.apply(step, explanation)
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
+        if explanation.kind == "take" and explanation.thing is not None and explanation.removed[0].tag is not None:
+            events.append(self._namer.pin(step.now, explanation.thing, explanation.removed[0].tag))
         return events + self._name(step.now)
 
     def _evidence(self, step: Step) -> Evidence:

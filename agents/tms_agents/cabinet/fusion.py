@@ -75,7 +75,10 @@ class Doubt:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """``removed`` things leave, ``load`` (k,) is what a new (put, swap) or remaining (slide, adjust) thing has then."""
+    """``removed`` things leave, ``load`` (k,) is what a new (put, swap) or remaining (slide, adjust) thing has then.
+
+    A ``thing`` that remains where another one leaves (take) has that one's tag.
+    """
 
     kind: Kind
     score: float

@@ -32,6 +32,8 @@ _SURE, _DOUBT = 0.9, 0.05
 _SURE_SHAKEN, _SURE_AT_ONCE = 0.98, 0.85
 #: What was told and is so probable is looked at no more once the board rests.
 _CERTAIN = 0.95
+#: What is no more probable than that is not where the next episode begins.
+_IMPROBABLE = 0.3
 #: A verdict that is so sure ends the episode: the next change begins another one. Not where something does not weigh
 #: what its tag says: the rest of it may follow.
 _CLOSES = 0.97
@@ -61,6 +63,8 @@ class Hindsight:
         self._uncertain = False
         self._looked = -math.inf
         self._sure = False
+        #: How probable what was told is, where something shakes the board.
+        self._likely = 1.0
         #: The tags that were in view when it was looked at.
         self._heard: frozenset[str] = frozenset()
         self._revisions = 0
@@ -69,7 +73,7 @@ class Hindsight:
         """The load is not at rest; ``level`` is where it last rested."""
         if self._before is not None:
             self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start)
-            self._before, self._uncertain, self._revisions = None, False, 0
+            self._before, self._uncertain, self._revisions, self._likely = None, False, 0, 1.0
         self._sure = False
         if self._episode is not None:
             self._episode.add(block)
@@ -95,7 +99,8 @@ class Hindsight:
             self._looked = t
             self._heard = self._present()
             events = self._revise(self._episode, t, level, variance, rested, shaking or self._uncertain)
-        if seconds >= _RESTED_S:
+        # What is improbable, though the board shakes too much for anything else to be sure, what comes next decides.
+        if seconds >= (_RESTED_S if self._likely > _IMPROBABLE else _CLOSED_S):
             self._before = self._copies()
         if seconds >= _CLOSED_S:
             self._episode = None
@@ -128,11 +133,12 @@ class Hindsight:
         found = _trusting(self._outcomes(episode, t, level, variance, rested, shaking), told)
         best = found[0]
         likely = sum(one.score for one in found if one.known and _same(one, told))
-        self._sure = likely > _CERTAIN
+        self._sure, self._likely = likely > _CERTAIN, likely if shaking else 1.0
         enough = _SURE_SHAKEN if shaking else _SURE
         if not best.known or best.score < enough or _same(best, told) or likely > _DOUBT:
             return []
         self._revisions += 1
+        self._likely = best.score
         return self._revision(episode, best, t).events()
 
     def _revision(self, episode: Episode, outcome: Outcome, t: float) -> Revision:

@@ -78,13 +78,17 @@ class Ledger:
         self.mean = self.mean + (gain * (level - expected)[:, None]).T
         self.cov = self.cov - gain[:, :, None] * self.cov.sum(axis=1)[:, None, :]
 
-    def teach(self, things: Mapping[int, Thing]) -> None:
-        """Tell the shelf what is known by now of each load; of things that came together it keeps what it has."""
+    def teach(self, things: Mapping[int, Thing], measured: int | None = None) -> None:
+        """Tell the shelf what is known by now of each load; of things that came together it keeps what it has.
+
+        The stay that is being ``measured`` now is told only that it was wrong: all that this rest says of it is in its
+        load already, and better, since here one level of a rest after the other counts as if it were news.
+        """
         for row, i in enumerate(self.ids, start=1):
             thing, variance = things[i], self.cov[:, row, row].copy()
             both = float(variance.sum() + thing.variance.sum())
             wrong = float((self.mean[row] - thing.load).sum()) ** 2 > _WRONG_SD**2 * both
-            if thing.joint or (not wrong and float(variance.sum()) > float(thing.variance.sum())):
+            if thing.joint or (not wrong and (i == measured or float(variance.sum()) > float(thing.variance.sum()))):
                 continue
             if self._another(replace(thing, load=self.mean[row])):
                 thing.forget_place()

@@ -66,6 +66,42 @@ def test_one_out_and_another_in_that_nobody_told() -> None:
     assert best.load == pytest.approx(new, abs=3)
 
 
+def test_a_tag_left_with_a_stay_that_is_over_goes_to_the_same_thing_elsewhere() -> None:
+    old, other, new = 60 * share(0.1, 0.1), 500 * share(0.3, 0.1), 60 * share(0.35, 0.25)
+    shelf, (thing, _) = shelf_with(old, other)
+    thing.tag = "E00401"
+    balance = Balance(shelf, SETTINGS)
+    balance.rest(1.0, old + other, NOISE)
+    moved = shelf.put(new, NOISE, since=3.0, onset=2.0)
+    step = balance.rest(4.0, other + new, NOISE)
+    assert step is not None
+
+    def read(one: Thing) -> float:
+        return -16.0 if one.tag else 0.0
+
+    best = search(step, balance, shelf, Evidence(read, {}), SETTINGS)[0]
+    assert (best.kind, best.removed, best.thing) == ("take", (thing,), moved) and best.score > 0.9
+    # Of another weight it is another thing, and the tag that is read speaks for the old one.
+    moved.load = 90 * share(0.35, 0.25)
+    step = balance.rest(5.0, other + moved.load, NOISE)
+    assert step is not None
+    best = search(step, balance, shelf, Evidence(read, {}), SETTINGS)[0]
+    assert best.thing is not moved or best.score < 0.9
+
+
+def test_what_is_being_measured_is_told_only_that_it_was_wrong() -> None:
+    load = 300 * share(0.2, 0.1)
+    shelf, _ = shelf_with()
+    balance = Balance(shelf, SETTINGS)
+    balance.rest(1.0, 0 * load, NOISE)
+    thing = shelf.put(load + 1.0, 9 * NOISE, since=2.0, onset=1.5)
+    for second in range(2, 6):
+        assert balance.rest(float(second), load, NOISE, measured=thing.id) is None
+    assert thing.load == pytest.approx(load + 1.0)
+    balance.rest(6.0, load, NOISE)
+    assert abs(thing.load - load).max() < 0.5
+
+
 def test_a_board_that_was_emptied_while_a_cell_was_dead_is_empty() -> None:
     bench = Bench(seed=5)
     for load in (400 * share(0.1, 0.1), 250 * share(0.35, 0.1), 650 * share(0.3, 0.25)):
