@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, parallel_chunksize, prange
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from tms_agents.slam.agreement import agreement
@@ -15,6 +15,7 @@ from tms_agents.slam.geometry import Bytes, Floats, Ints, between, compose, inve
 from tms_agents.slam.keyframes import Indices
 from tms_agents.slam.maps import Maps, padded
 from tms_agents.slam.matching import SHARE, match
+from tms_agents.slam.sharing import queue, take
 from tms_agents.slam.submaps import GROUP, Submaps, pyramids
 
 #: Points of a cloud, keys on either side that it is made of, its least mean score in a search.
@@ -94,12 +95,11 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[li
         starts, scores = np.empty((len(some), 3)), np.empty(len(some))
         searched, place = np.unique(which[some], return_inverse=True)
         levels, origin, scale = pyramids(maps, searched, _SIGMA_M)
-        with parallel_chunksize(1):  # some searches take a hundred times as long as others
-            best_poses(
-                levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
-                np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
-                _TURN_STEP, _LEAST, starts, scores,
-            )  # fmt: skip
+        best_poses(
+            levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
+            np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
+            _TURN_STEP, _LEAST, starts, scores,
+        )  # fmt: skip
         hit = some[scores > 0.0]
         again = np.empty((len(hit), 3)), np.empty((len(hit), 3, 3)), np.zeros(len(hit))
         _refine(maps, which[hit], clouds[hit], lengths[hit], starts[scores > 0.0], *again)
@@ -178,20 +178,24 @@ def _refine_all(
     """Matches of clouds (A, M, 2) in maps ``which`` (A,) from ``starts`` (A, 3): ``poses``, ``hessians``, and as
     ``fits`` (A,) the share that fits, 0 where the match does not hold."""
     loose = np.diag(np.array([1.0, 1.0, 25.0]))
-    for a in prange(len(which)):
-        one, cloud, result = which[a], clouds[a, : lengths[a]], np.empty(3)
-        match(
-            directory[one], squared, metres, frame, cloud, starts[a], starts[a], loose, _SIGMA_M, 1.0, poses[a],
-            hessians[a], result,
-        )  # fmt: skip
-        fits[a] = 0.0
-        if result[SHARE] < _KNOWN * _FITS:
-            continue
-        near, free = agreement(
-            occupancy_directory[one], occupancy, directory[one], squared, metres, frame, cloud, poses[a], _NEAR_M
-        )
-        if near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud):
-            fits[a] = near / (near + free)
+    line = queue(len(which))
+    for begin in prange(len(which)):
+        a = take(line, begin)
+        while a < len(which):
+            one, cloud, result = which[a], clouds[a, : lengths[a]], np.empty(3)
+            match(
+                directory[one], squared, metres, frame, cloud, starts[a], starts[a], loose, _SIGMA_M, 1.0, poses[a],
+                hessians[a], result,
+            )  # fmt: skip
+            near, free = 0, 0
+            if result[SHARE] >= _KNOWN * _FITS:
+                near, free = agreement(
+                    occupancy_directory[one], occupancy, directory[one], squared, metres, frame, cloud, poses[a],
+                    _NEAR_M,
+                )  # fmt: skip
+            holds = near > 0 and near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud)
+            fits[a] = near / (near + free) if holds else 0.0
+            a = take(line, a)
 
 
 def consistent(closures: list[Closure], path: Floats, way: Floats) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tms_agents.slam.distance import LARGEST_RADIUS, disc, mark_discs, update_distances
 from tms_agents.slam.geometry import Bytes, Floats, Ints
-from tms_agents.slam.occupancy import UNKNOWN, mark_rays, write_rays
+from tms_agents.slam.occupancy import UNKNOWN, list_occupied, mark_rays, write_rays
 from tms_agents.slam.tiles import SIDE, TiledMaps
 
 #: Change so many cells per beam at most become free in one scan; the others wait for the next one.
@@ -32,13 +32,24 @@ class Maps:
 
     def integrate(self, poses: Floats, points: Floats, laser: Floats, fields: bool = True) -> None:
         """Write one scan into every map: ``points`` (M, 2) where beams from ``laser`` (2,) ended, seen from ``poses``
-        (N, 3). Without ``fields``, distances are no longer kept up."""
+        (N, 3). Without ``fields``, distances are not kept up until `measure`."""
         self._integrate(poses, points[None], np.array([len(points)], dtype=np.int32), laser, fields)
 
-    def integrate_each(self, poses: Floats, scans: Sequence[Floats], laser: Floats) -> None:
+    def integrate_each(self, poses: Floats, scans: Sequence[Floats], laser: Floats, fields: bool = True) -> None:
         """Write a scan of its own, (M, 2) points, into each of the N maps."""
         points, lengths = padded(scans)
-        self._integrate(poses, points, lengths, laser, True)
+        self._integrate(poses, points, lengths, laser, fields)
+
+    def measure(self) -> None:
+        """All distances anew: cheaper once, after many scans, than after each."""
+        n, height, width = self.occupancy.directory.shape
+        occupied, counts = np.empty((n, 0), dtype=np.int32), np.empty(n, dtype=np.int32)
+        list_occupied(self.occupancy.directory, self.occupancy.cells, occupied, counts)
+        occupied = np.empty((n, int(counts.max())), dtype=np.int32)
+        list_occupied(self.occupancy.directory, self.occupancy.cells, occupied, counts)
+        self.distance.clear()
+        seen: Bytes = np.zeros((n, height * width), dtype=np.uint8)
+        self._change_distances(occupied, counts, seen, np.empty(seen.shape, dtype=np.int32))
 
     def _integrate(self, poses: Floats, points: Floats, lengths: Ints, laser: Floats, fields: bool) -> None:
         reach = float(np.hypot(points[..., 0], points[..., 1]).max(initial=0.0)) + float(np.hypot(*laser))
@@ -54,22 +65,22 @@ class Maps:
         changes: Ints = np.empty(n, dtype=np.int32)
         beams = np.hypot(points[..., 0] - laser[0], points[..., 1] - laser[1])
         capacity = int((beams * self.frame[2] + 4).sum(axis=1).max(initial=0.0))
-        occupancy, distance = self.occupancy, self.distance
+        occupancy = self.occupancy
         write_rays(
             occupancy.directory, occupancy.cells, poses, points, lengths, laser, self.frame, capacity, changed, changes
         )
         if not fields:
             return
-        mark_discs(height, width, self.radius, changed, changes, seen, wanted, counts)
+        self._change_distances(changed, changes, seen, wanted)
+
+    def _change_distances(self, changed: Ints, changes: Ints, seen: Bytes, wanted: Ints) -> None:
+        """After cells ``changed[n, :changes[n]]`` (see `write_rays`); ``seen`` is zeros, ``wanted`` has room."""
+        occupancy, distance = self.occupancy, self.distance
+        counts: Ints = np.empty(len(changes), dtype=np.int32)
+        mark_discs(*distance.directory.shape[1:], self.radius, changed, changes, seen, wanted, counts)
         distance.make_writable(wanted, counts)
         update_distances(
-            distance.directory,
-            distance.cells,
-            occupancy.directory,
-            occupancy.cells,
-            self._offsets,
-            changed,
-            changes,
+            distance.directory, distance.cells, occupancy.directory, occupancy.cells, self._offsets, changed, changes
         )
 
     def resample(self, parents: Ints) -> None:

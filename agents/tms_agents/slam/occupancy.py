@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit, prange
 
 from tms_agents.slam.geometry import Bytes, Floats, Ints
-from tms_agents.slam.tiles import MASK, SHIFT
+from tms_agents.slam.sharing import queue, take
+from tms_agents.slam.tiles import MASK, SHIFT, SIDE
 
 UNKNOWN, EVEN = 0, 64
 HIT, MISS, LOWEST, HIGHEST = 9, 4, EVEN - 20, EVEN + 35
@@ -42,9 +43,13 @@ def mark_rays(
     = 1 or N), seen from ``poses`` (N, 3); ``frame`` is (x, y of the lower left corner in m, cells per m). ``seen``
     (N, H * W) is scratch of zeros and is zeros again afterwards; ``width`` is W in tiles.
     """
-    for n in prange(len(poses)):
-        p = int(min(np.int64(n), np.int64(len(points) - 1)))
-        counts[n] = _mark(width, poses[n], points[p, : lengths[p]], laser, frame, seen[n], wanted[n])
+    line = queue(len(poses))
+    for begin in prange(len(poses)):
+        n = take(line, begin)
+        while n < len(poses):
+            p = int(min(np.int64(n), np.int64(len(points) - 1)))
+            counts[n] = _mark(width, poses[n], points[p, : lengths[p]], laser, frame, seen[n], wanted[n])
+            n = take(line, n)
 
 
 @njit(cache=True, parallel=True)
@@ -66,10 +71,39 @@ def write_rays(
     ``changed`` (N, L) gets the cells (y * width in cells + x) that became occupied, and as -1 - cell those that ceased
     to be. No scan touches more than ``capacity`` cells.
     """
-    for n in prange(len(poses)):
-        p = int(min(np.int64(n), np.int64(len(points) - 1)))
-        mine = points[p, : lengths[p]]
-        counts[n] = _write(directory[n], cells, poses[n], mine, laser, frame, capacity, changed[n])
+    line = queue(len(poses))
+    for begin in prange(len(poses)):
+        n = take(line, begin)
+        while n < len(poses):
+            p = int(min(np.int64(n), np.int64(len(points) - 1)))
+            mine = points[p, : lengths[p]]
+            counts[n] = _write(directory[n], cells, poses[n], mine, laser, frame, capacity, changed[n])
+            n = take(line, n)
+
+
+@njit(cache=True, parallel=True)
+def list_occupied(directory: Ints, cells: Bytes, found: Ints, counts: Ints) -> None:
+    """Occupied cells (y * width in cells + x) of the maps (N, H, W), as many as there is room for in ``found`` (N, L);
+    ``counts`` (N,) is how many there are."""
+    width = directory.shape[2] << SHIFT
+    line = queue(len(counts))
+    for begin in prange(len(counts)):
+        n = take(line, begin)
+        while n < len(counts):
+            count = 0
+            for ty in range(directory.shape[1]):
+                for tx in range(directory.shape[2]):
+                    tile = directory[n, ty, tx]
+                    if tile == 0:
+                        continue
+                    for place in range(SIDE * SIDE):
+                        if cells[tile, place] > EVEN:
+                            if count < found.shape[1]:
+                                y, x = (ty << SHIFT) + (place >> SHIFT), (tx << SHIFT) + (place & MASK)
+                                found[n, count] = y * width + x
+                            count += 1
+            counts[n] = count
+            n = take(line, n)
 
 
 @njit(cache=True)

@@ -68,7 +68,8 @@ class Submaps:
         for step in range(int((ends - firsts).max())):
             keys = np.minimum(firsts + step, ends - 1)
             seen = [scans[int(key)] if firsts[n] + step < ends[n] else _NOTHING for n, key in enumerate(keys)]
-            maps.integrate_each(between(anchors, self.path[keys]), seen, laser)
+            maps.integrate_each(between(anchors, self.path[keys]), seen, laser, fields=False)
+        maps.measure()
         return maps
 
     def cloud(self, key: int, around: int, most: int) -> Floats:
