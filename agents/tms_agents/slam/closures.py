@@ -211,18 +211,18 @@ def consistent(closures: list[Closure], path: Floats, way: Floats) -> NDArray[np
     anchors, keys = np.array([c.anchor for c in closures]), np.array([c.key for c in closures])
     seen = np.array([c.seen for c in closures])
     merit = np.array([c.fit for c in closures]) ** _MERIT
+    apart = np.abs(way[keys] - way[keys][:, None]) + np.abs(way[anchors] - way[anchors][:, None])
+    np.fill_diagonal(apart, np.inf)
+    one, others = np.nonzero(apart < _CROWD_M)
+    from_anchor = inverse(between(path[anchors[one]], path[anchors[others]]))
+    expected = compose(compose(from_anchor, seen[one]), between(path[keys[one]], path[keys[others]]))
+    error, far = expected - seen[others], apart[one, others]
+    same = (np.hypot(error[:, 0], error[:, 1]) < 0.25 + 0.03 * far) & (
+        np.abs(wrapped(error[:, 2])) < 0.05 + 0.003 * far
+    )
     agree, contradict = np.zeros((count, count), dtype=bool), np.zeros((count, count), dtype=bool)
-    for n in range(count):
-        apart = np.abs(way[keys] - way[keys[n]]) + np.abs(way[anchors] - way[anchors[n]])
-        others = np.flatnonzero((apart < _CROWD_M) & (np.arange(count) != n))
-        from_anchor = inverse(between(path[anchors[n]][None], path[anchors[others]]))
-        expected = compose(compose(from_anchor, seen[n][None]), between(path[keys[n]][None], path[keys[others]]))
-        error = expected - seen[others]
-        same = (np.hypot(error[:, 0], error[:, 1]) < 0.25 + 0.03 * apart[others]) & (
-            np.abs(wrapped(error[:, 2])) < 0.05 + 0.003 * apart[others]
-        )
-        agree[n, others[same]] = True
-        contradict[n, others[~same]] = True
+    agree[one[same], others[same]] = True
+    contradict[one[~same], others[~same]] = True
     support = agree @ merit + merit
     rival = np.where(contradict | contradict.T, support, 0.0).max(axis=1)
     kept: NDArray[np.bool_] = (agree.sum(axis=1) >= 2) & (support > _CLEARLY * rival)

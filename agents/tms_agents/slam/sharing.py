@@ -15,7 +15,8 @@ piece computes depends neither on who does it nor on when.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 from numba import njit, types
@@ -23,6 +24,19 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 Queue = NDArray[np.int64]
+
+
+def _adding(_: Any, line: Any, place: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        address = builder.gep(array.data, [arguments[1]])
+        return builder.atomic_rmw("add", address, context.get_constant(types.int64, 1), "monotonic")
+
+    return types.int64(line, types.int64), generate
+
+
+#: One more at a place of a queue, atomically; what was there before.
+_add = cast(Callable[[Queue, int], int], intrinsic(_adding))
 
 
 @njit(cache=True)
@@ -45,15 +59,3 @@ def take(line: Queue, first: int) -> int:
             _add(line, count)
             return one
     return count
-
-
-@intrinsic
-def _add(_: Any, line: Any, place: Any) -> Any:
-    """One more at a ``place`` of ``line``, atomically; what was there before."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        address = builder.gep(array.data, [arguments[1]])
-        return builder.atomic_rmw("add", address, context.get_constant(types.int64, 1), "monotonic")
-
-    return types.int64(line, types.int64), generate
