@@ -146,7 +146,8 @@ def test_light_goes_with_the_map(tmp_path):
     made = record("corridor", 5)
     (tmp_path / "stream.jsonl").write_text("\n".join(made.lines[:400]))
     (tmp_path / "models.json").write_text(made.models)
-    command = ["run", str(tmp_path / "stream.jsonl"), "--out", str(tmp_path / "out"), "--particles", "30", "--intensity"]
+    files = [str(tmp_path / "stream.jsonl"), "--out", str(tmp_path / "out")]
+    command = ["run", *files, "--particles", "30", "--intensity"]
     with ServerProcess(tmp_path / "data") as server:
         prepare(server.url)
         assert slam.main([*command, "--upload", "corridor", "--upload-every", "0.1", "--url", server.url]) == 0
