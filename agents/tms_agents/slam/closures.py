@@ -86,10 +86,16 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[li
     poses, hessians, fits = np.empty_like(thought), np.empty((len(which), 3, 3)), np.zeros(len(which))
     _refine(maps, which, clouds, lengths, thought, poses, hessians, fits)
     found: list[list[Closure]] = [[] for _ in questions]
-    for n, question in enumerate(questions):
-        if fits[n] > 0.0:
+
+    def keep(numbers: Indices, poses: Floats, hessians: Floats, fits: Floats) -> None:
+        information = _information(hessians)
+        for k, n in enumerate(numbers):
             cloud = clouds[n, : lengths[n]]
-            found[n] += _closure(submaps, maps, question, cloud, poses[n], hessians[n], fits[n])
+            match = poses[k], hessians[k], information[k]
+            found[n] += _closure(submaps, maps, questions[n], cloud, *match, fits[k])
+
+    near = np.flatnonzero(fits > 0.0)
+    keep(near, poses[near], hessians[near], fits[near])
     widely = np.flatnonzero([q.window > 0 and (q.anyway or not found[n]) for n, q in enumerate(questions)])
     for some in _few_submaps(which, widely):
         starts, scores = np.empty((len(some), 3)), np.empty(len(some))
@@ -103,9 +109,10 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[li
         hit = some[scores > 0.0]
         again = np.empty((len(hit), 3)), np.empty((len(hit), 3, 3)), np.zeros(len(hit))
         _refine(maps, which[hit], clouds[hit], lengths[hit], starts[scores > 0.0], *again)
-        for n, pose, hessian, fit in zip(hit, *again, strict=True):
-            if fit > 0.0 and (not found[n] or np.hypot(*(pose - poses[n])[:2]) > _APART_M):
-                found[n] += _closure(submaps, maps, questions[n], clouds[n, : lengths[n]], pose, hessian, fit)
+        new = np.hypot(*(again[0] - poses[hit])[:, :2].T) > _APART_M
+        new |= np.array([not found[n] for n in hit], dtype=bool)
+        new &= again[2] > 0.0
+        keep(hit[new], *(part[new] for part in again))
     return found
 
 
@@ -117,7 +124,14 @@ def _few_submaps(which: Ints, asked: Indices) -> Iterator[Indices]:
 
 
 def _closure(
-    submaps: Submaps, maps: Maps, question: Question, cloud: Floats, pose: Floats, hessian: Floats, fit: float
+    submaps: Submaps,
+    maps: Maps,
+    question: Question,
+    cloud: Floats,
+    pose: Floats,
+    hessian: Floats,
+    information: Floats,
+    fit: float,
 ) -> list[Closure]:
     """What geometry found, or geometry and light together; none if light contradicts."""
     if submaps.light is not None:
@@ -127,11 +141,15 @@ def _closure(
         )
         if placed is None or not _agrees(maps, which, cloud, placed[0]):
             return []
-        pose, hessian = placed
-    covariance = np.linalg.inv(hessian) * _WITNESSES + np.diag(np.square(_FLOOR))
+        pose, information = placed[0], _information(placed[1])
     shift = float(np.hypot(*(pose - question.thought)[:2]))
-    anchor = int(submaps.anchors[question.number])
-    return [Closure(anchor, question.key, pose, np.linalg.inv(covariance), float(fit), shift)]
+    return [Closure(int(submaps.anchors[question.number]), question.key, pose, information, float(fit), shift)]
+
+
+def _information(hessians: Floats) -> Floats:
+    """(..., 3, 3) of matches with these ``hessians``, whose points are no independent witnesses."""
+    found: Floats = np.linalg.inv(np.linalg.inv(hessians) * _WITNESSES + np.diag(np.square(_FLOOR)))
+    return found
 
 
 def _agrees(maps: Maps, which: int, cloud: Floats, pose: Floats) -> bool:
