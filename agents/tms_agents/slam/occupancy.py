@@ -101,18 +101,14 @@ def list_occupied(directory: Ints, cells: Bytes, found: Ints, counts: Ints) -> N
     for begin in prange(len(counts)):
         n = take(line, begin)
         while n < len(counts):
-            count = 0
-            for ty in range(directory.shape[1]):
-                for tx in range(directory.shape[2]):
-                    tile = directory[n, ty, tx]
-                    if tile == 0:
-                        continue
-                    for place in range(SIDE * SIDE):
-                        if cells[tile, place] > EVEN:
-                            if count < found.shape[1]:
-                                y, x = (ty << SHIFT) + (place >> SHIFT), (tx << SHIFT) + (place & MASK)
-                                found[n, count] = y * width + x
-                            count += 1
+            count, tiles = 0, directory[n].ravel()
+            for t in np.flatnonzero(tiles):
+                left, bottom = (t % directory.shape[2]) << SHIFT, (t // directory.shape[2]) << SHIFT
+                for place in range(SIDE * SIDE):
+                    if cells[tiles[t], place] > EVEN:
+                        if count < found.shape[1]:
+                            found[n, count] = (bottom + (place >> SHIFT)) * width + left + (place & MASK)
+                        count += 1
             counts[n] = count
             n = take(line, n)
 
