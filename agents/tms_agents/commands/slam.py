@@ -94,7 +94,7 @@ def _run(arguments: argparse.Namespace) -> int:
         if sys.stderr.isatty():
             sys.stderr.write("\n")
         stats = _write(arguments, log, settings, result, seconds)
-        uploaded = upload.finish(result.grid)
+        uploaded = upload.finish(result.grid, result.light)
     sys.stdout.write(
         f"{stats['scans']} scans, {stats['processed']} processed in {seconds:.1f} s "
         f"({stats['real_time_factor']:.0f} x real time), {stats['loops']} revisits -> {arguments.out}{uploaded}\n"

@@ -16,11 +16,16 @@ from tms_client.cli import CommandError
 
 
 def compare(arguments: argparse.Namespace) -> int:
-    """Prints the agreement; with two trajectories, a picture of both, the second one laid over the first pose."""
+    """Prints the agreement; with two trajectories, a picture of both, laid over one another where they begin to be at
+    the same time."""
     a = _read(arguments.a, trajectory=True)
     odometry = None if arguments.odom is None else _read(arguments.odom, trajectory=True)
     relations = arguments.b.name.removesuffix(".gz").endswith(".relations")
     b = _read(arguments.b, trajectory=not relations)
+    if not relations:
+        b = b[(b[:, 0] >= a[:, 0].min()) & (b[:, 0] <= a[:, 0].max())]
+        if len(b) < 2:
+            raise CommandError("the two trajectories have no time in common")
     found = agreement_with(b if relations else relations_of(b), a, odometry)
     sys.stdout.write(
         f"{found.relations} relations: {found.translation:.4f} +- {found.translation_deviation:.4f} m "
@@ -29,7 +34,8 @@ def compare(arguments: argparse.Namespace) -> int:
     if not relations:
         folder = arguments.a if arguments.a.is_dir() else arguments.a.parent
         png = arguments.png or folder / "compare.png"
-        laid = compose(a[:1, 1:], between(b[:1, 1:], b[:, 1:]))
+        same = a[np.argmin(np.abs(a[:, 0] - b[0, 0])), 1:]
+        laid = compose(same[None], between(b[:1, 1:], b[:, 1:]))
         try:
             Image.fromarray(paths_picture([a[:, 1:3], np.asarray(laid)[:, :2]])).save(png)
         except OSError as error:

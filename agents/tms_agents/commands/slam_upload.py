@@ -7,17 +7,20 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
 from pydantic import ValidationError
 
 from tms_agents.commands.slam_log import pose
 from tms_agents.robot.map_uploader import Grid, MapUploader
 from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.gridmap import GridMap, grid_map
+from tms_agents.slam.light.gridlight import GridLight, grid_light
 from tms_client import NotFound, Town
 from tms_client.cli import CommandError
 from tms_client.commands.options import add_server_options
 from tms_client.errors import TownError
 from tms_client.flows import NO_RETRY, first_error
+from tms_client.maps.cells import Intensity
 from tms_schemas.maps import MapIn
 
 #: The finished map is offered for so long to a server that is away.
@@ -43,13 +46,13 @@ class Upload:
 
     def watch(self, particles: ParticleFilter) -> None:
         if self._uploader is not None:
-            self._uploader.offer(lambda: _grid(grid_map(particles.maps, particles.best)))
+            self._uploader.offer(lambda: _so_far(particles))
 
-    def finish(self, grid: GridMap) -> str:
+    def finish(self, grid: GridMap, light: GridLight | None = None) -> str:
         """In words, to be added to what the command says."""
         if self._uploader is None:
             return ""
-        made = self._uploader.finish(_grid(grid), _PATIENCE_S)
+        made = self._uploader.finish(_grid(grid, light), _PATIENCE_S)
         return f"; map {self._map} on the server is at version {made.version}"
 
 
@@ -87,8 +90,22 @@ def _require_map(town: Town, arguments: argparse.Namespace) -> None:
         raise CommandError(f"map {about.id} has cells of {about.resolution:g} m, not {arguments.resolution:g} m")
 
 
-def _grid(grid: GridMap) -> Grid:
-    return grid.probabilities(), grid.origin
+def _so_far(particles: ParticleFilter) -> Grid:
+    """The best particle's map, and its light along its path."""
+    grid = grid_map(particles.maps, particles.best)
+    light = None if particles.light is None else grid_light(grid, particles.path(), particles.light.scans)
+    return _grid(grid, light)
+
+
+def _grid(grid: GridMap, light: GridLight | None) -> Grid:
+    """Light as in ``imap.npy``: in comparison with a usual surface."""
+    if light is None:
+        return Grid(grid.probabilities(), grid.origin)
+    mean = light.reflectance()
+    layers = Intensity(
+        mean.astype(np.float32), (mean**2 * light.variance).astype(np.float32), light.count.astype(np.uint32)
+    )
+    return Grid(grid.probabilities(), grid.origin, layers)
 
 
 def _say(text: str) -> None:

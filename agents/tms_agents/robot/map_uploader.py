@@ -7,17 +7,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from tms_client import Busy, Conflict, ServerFault, Town, TownError, Unreachable
+from tms_client.maps.cells import Intensity
 from tms_schemas.maps import MapObject, MapVersion
 
-#: Occupancy (H, W) and the lower left corner of its first cell (m).
-Grid = tuple[npt.NDArray[np.float64], tuple[float, float]]
 _OUTAGE = (Unreachable, Busy, ServerFault)
 _PAUSE_S = 0.5
+
+
+class Grid(NamedTuple):
+    """``occupancy`` (H, W), ``origin`` m is the lower left corner of its first cell; received light, where known."""
+
+    occupancy: npt.NDArray[np.float64]
+    origin: tuple[float, float]
+    intensity: Intensity | None = None
 
 
 class MapUploader:
@@ -108,10 +116,10 @@ class MapUploader:
         return made
 
     def _upload(self, grid: Grid, note: str, objects: Sequence[MapObject] | None, base: int | None) -> MapVersion:
-        occupancy, origin = grid
         return self._town.maps.upload(
-            self._map, occupancy, origin, agent=self._agent, objects=objects, note=note, base=base, snap=True
-        )
+            self._map, grid.occupancy, grid.origin, agent=self._agent, intensity=grid.intensity, objects=objects,
+            note=note, base=base, snap=True,
+        )  # fmt: skip
 
     def _fails(self, error: TownError) -> None:
         if not self._out:

@@ -43,4 +43,4 @@ class Mapper:
 
     def grid(self) -> Grid:
         found = grid_map(self._particles.maps, self._particles.best)
-        return found.probabilities(), found.origin
+        return Grid(found.probabilities(), found.origin)

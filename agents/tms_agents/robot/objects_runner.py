@@ -24,7 +24,7 @@ from tms_agents.robot.config import LiveSource, LogSource, ObjectsSection, Robot
 from tms_agents.robot.estimating import Update
 from tms_agents.robot.estimator import Estimator
 from tms_agents.robot.live_devices import device_records
-from tms_agents.robot.map_uploader import MapUploader
+from tms_agents.robot.map_uploader import Grid, MapUploader
 from tms_agents.robot.records import Drive, Pose, Record, Snapshot, placed
 from tms_agents.robot.replaying import replayed
 from tms_agents.robot.shapes import Shapes
@@ -232,7 +232,7 @@ class _Mind:
 
     def _send(self, snapshot: Snapshot, update: Update, why: str, patience_s: float | None) -> None:
         """A refusal is said once; the robot drives on."""
-        grid = update.occupancy, update.origin
+        grid = Grid(update.occupancy, update.origin)
         earlier = self._online.earlier
         objects = map_objects(update, snapshot.times, self._ahead_s, () if earlier is None else earlier.objects)
         note = f"{why}: {in_words(snapshot, update)}"

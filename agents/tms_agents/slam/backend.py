@@ -132,11 +132,12 @@ class Drift:
         covariance = frame @ np.linalg.inv(chain.information) @ frame.swapaxes(1, 2)
         parts = carried @ covariance @ carried.swapaxes(1, 2)
         self._sums = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(parts, axis=0)])
+        self._back = np.linalg.inv(_carried(path))
 
     def between(self, first: Indices, second: Indices) -> Floats:
         """(E, 3, 3) of keys ``second`` seen from keys ``first``, in the frames of those."""
         whole = self._sums[second] - self._sums[first]
-        back = np.linalg.inv(_carried(self._path[second]))
+        back = self._back[second]
         turned = _rotations(-self._path[first, 2])
         there = turned @ back @ whole @ back.swapaxes(1, 2) @ turned.swapaxes(1, 2)
         found: Floats = _INFLATED * there + np.diag(np.square(_JUMP))

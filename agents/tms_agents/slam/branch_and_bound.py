@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit, prange
 
 from tms_agents.slam.geometry import Bytes, Floats, Ints
+from tms_agents.slam.sharing import queue, take
 from tms_agents.slam.tiles import MASK, SHIFT, SIDE
 
 LEVELS = 6
@@ -26,20 +27,24 @@ def fill_pyramids(directory: Ints, squared: Bytes, scores: Bytes, pool: int, lev
     in cells, 255 = best; pad = 2^(LEVELS-1) cells below and to the left stay 0.
     """
     pad = 1 << (levels.shape[1] - 1)
-    for n in prange(len(directory)):
-        for ty in range(directory.shape[1]):
-            for tx in range(directory.shape[2]):
-                tile = directory[n, ty, tx]
-                if tile == 0:
-                    continue
-                for place in range(SIDE * SIDE):
-                    score = scores[squared[tile, place]]
-                    y = pad + ((ty << SHIFT) + (place >> SHIFT)) // pool
-                    x = pad + ((tx << SHIFT) + (place & MASK)) // pool
-                    if score > levels[n, 0, y, x]:
-                        levels[n, 0, y, x] = score
-        for h in range(1, levels.shape[1]):
-            _coarser(levels[n, h - 1], 1 << (h - 1), levels[n, h])
+    line = queue(len(directory))
+    for begin in prange(len(directory)):
+        n = take(line, begin)
+        while n < len(directory):
+            for ty in range(directory.shape[1]):
+                for tx in range(directory.shape[2]):
+                    tile = directory[n, ty, tx]
+                    if tile == 0:
+                        continue
+                    for place in range(SIDE * SIDE):
+                        score = scores[squared[tile, place]]
+                        y = pad + ((ty << SHIFT) + (place >> SHIFT)) // pool
+                        x = pad + ((tx << SHIFT) + (place & MASK)) // pool
+                        if score > levels[n, 0, y, x]:
+                            levels[n, 0, y, x] = score
+            for h in range(1, levels.shape[1]):
+                _coarser(levels[n, h - 1], 1 << (h - 1), levels[n, h])
+            n = take(line, n)
 
 
 @njit(cache=True)
@@ -72,11 +77,15 @@ def best_poses(
 ) -> None:
     """`best_pose` of clouds (A, M, 2), of which the first ``lengths`` (A,) points count, in pyramid ``which[a]`` each;
     ``found`` (A, 3) and ``scores`` (A,) are written."""
-    for a in prange(len(which)):
-        scores[a] = best_pose(
-            levels[which[a]], origin, scale, clouds[a, : lengths[a]], centres[a], windows[a], turns[a], turn_step,
-            least, found[a],
-        )  # fmt: skip
+    line = queue(len(which))
+    for begin in prange(len(which)):
+        a = take(line, begin)
+        while a < len(which):
+            scores[a] = best_pose(
+                levels[which[a]], origin, scale, clouds[a, : lengths[a]], centres[a], windows[a], turns[a], turn_step,
+                least, found[a],
+            )  # fmt: skip
+            a = take(line, a)
 
 
 @njit(cache=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, parallel_chunksize, prange
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from tms_agents.slam.agreement import agreement
@@ -15,6 +15,7 @@ from tms_agents.slam.geometry import Bytes, Floats, Ints, between, compose, inve
 from tms_agents.slam.keyframes import Indices
 from tms_agents.slam.maps import Maps, padded
 from tms_agents.slam.matching import SHARE, match
+from tms_agents.slam.sharing import queue, take
 from tms_agents.slam.submaps import GROUP, Submaps, pyramids
 
 #: Points of a cloud, keys on either side that it is made of, its least mean score in a search.
@@ -85,27 +86,33 @@ def _answers(submaps: Submaps, group: int, questions: list[Question]) -> list[li
     poses, hessians, fits = np.empty_like(thought), np.empty((len(which), 3, 3)), np.zeros(len(which))
     _refine(maps, which, clouds, lengths, thought, poses, hessians, fits)
     found: list[list[Closure]] = [[] for _ in questions]
-    for n, question in enumerate(questions):
-        if fits[n] > 0.0:
+
+    def keep(numbers: Indices, poses: Floats, hessians: Floats, fits: Floats) -> None:
+        information = _information(hessians)
+        for k, n in enumerate(numbers):
             cloud = clouds[n, : lengths[n]]
-            found[n] += _closure(submaps, maps, question, cloud, poses[n], hessians[n], fits[n])
+            match = poses[k], hessians[k], information[k]
+            found[n] += _closure(submaps, maps, questions[n], cloud, *match, fits[k])
+
+    near = np.flatnonzero(fits > 0.0)
+    keep(near, poses[near], hessians[near], fits[near])
     widely = np.flatnonzero([q.window > 0 and (q.anyway or not found[n]) for n, q in enumerate(questions)])
     for some in _few_submaps(which, widely):
         starts, scores = np.empty((len(some), 3)), np.empty(len(some))
         searched, place = np.unique(which[some], return_inverse=True)
         levels, origin, scale = pyramids(maps, searched, _SIGMA_M)
-        with parallel_chunksize(1):  # some searches take a hundred times as long as others
-            best_poses(
-                levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
-                np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
-                _TURN_STEP, _LEAST, starts, scores,
-            )  # fmt: skip
+        best_poses(
+            levels, place.astype(np.int32), origin, scale, clouds[some], lengths[some], thought[some],
+            np.array([questions[n].window for n in some]), np.array([questions[n].turn for n in some]),
+            _TURN_STEP, _LEAST, starts, scores,
+        )  # fmt: skip
         hit = some[scores > 0.0]
         again = np.empty((len(hit), 3)), np.empty((len(hit), 3, 3)), np.zeros(len(hit))
         _refine(maps, which[hit], clouds[hit], lengths[hit], starts[scores > 0.0], *again)
-        for n, pose, hessian, fit in zip(hit, *again, strict=True):
-            if fit > 0.0 and (not found[n] or np.hypot(*(pose - poses[n])[:2]) > _APART_M):
-                found[n] += _closure(submaps, maps, questions[n], clouds[n, : lengths[n]], pose, hessian, fit)
+        new = np.hypot(*(again[0] - poses[hit])[:, :2].T) > _APART_M
+        new |= np.array([not found[n] for n in hit], dtype=bool)
+        new &= again[2] > 0.0
+        keep(hit[new], *(part[new] for part in again))
     return found
 
 
@@ -117,7 +124,14 @@ def _few_submaps(which: Ints, asked: Indices) -> Iterator[Indices]:
 
 
 def _closure(
-    submaps: Submaps, maps: Maps, question: Question, cloud: Floats, pose: Floats, hessian: Floats, fit: float
+    submaps: Submaps,
+    maps: Maps,
+    question: Question,
+    cloud: Floats,
+    pose: Floats,
+    hessian: Floats,
+    information: Floats,
+    fit: float,
 ) -> list[Closure]:
     """What geometry found, or geometry and light together; none if light contradicts."""
     if submaps.light is not None:
@@ -127,11 +141,15 @@ def _closure(
         )
         if placed is None or not _agrees(maps, which, cloud, placed[0]):
             return []
-        pose, hessian = placed
-    covariance = np.linalg.inv(hessian) * _WITNESSES + np.diag(np.square(_FLOOR))
+        pose, information = placed[0], _information(placed[1])
     shift = float(np.hypot(*(pose - question.thought)[:2]))
-    anchor = int(submaps.anchors[question.number])
-    return [Closure(anchor, question.key, pose, np.linalg.inv(covariance), float(fit), shift)]
+    return [Closure(int(submaps.anchors[question.number]), question.key, pose, information, float(fit), shift)]
+
+
+def _information(hessians: Floats) -> Floats:
+    """(..., 3, 3) of matches with these ``hessians``, whose points are no independent witnesses."""
+    found: Floats = np.linalg.inv(np.linalg.inv(hessians) * _WITNESSES + np.diag(np.square(_FLOOR)))
+    return found
 
 
 def _agrees(maps: Maps, which: int, cloud: Floats, pose: Floats) -> bool:
@@ -178,20 +196,24 @@ def _refine_all(
     """Matches of clouds (A, M, 2) in maps ``which`` (A,) from ``starts`` (A, 3): ``poses``, ``hessians``, and as
     ``fits`` (A,) the share that fits, 0 where the match does not hold."""
     loose = np.diag(np.array([1.0, 1.0, 25.0]))
-    for a in prange(len(which)):
-        one, cloud, result = which[a], clouds[a, : lengths[a]], np.empty(3)
-        match(
-            directory[one], squared, metres, frame, cloud, starts[a], starts[a], loose, _SIGMA_M, 1.0, poses[a],
-            hessians[a], result,
-        )  # fmt: skip
-        fits[a] = 0.0
-        if result[SHARE] < _KNOWN * _FITS:
-            continue
-        near, free = agreement(
-            occupancy_directory[one], occupancy, directory[one], squared, metres, frame, cloud, poses[a], _NEAR_M
-        )
-        if near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud):
-            fits[a] = near / (near + free)
+    line = queue(len(which))
+    for begin in prange(len(which)):
+        a = take(line, begin)
+        while a < len(which):
+            one, cloud, result = which[a], clouds[a, : lengths[a]], np.empty(3)
+            match(
+                directory[one], squared, metres, frame, cloud, starts[a], starts[a], loose, _SIGMA_M, 1.0, poses[a],
+                hessians[a], result,
+            )  # fmt: skip
+            near, free = 0, 0
+            if result[SHARE] >= _KNOWN * _FITS:
+                near, free = agreement(
+                    occupancy_directory[one], occupancy, directory[one], squared, metres, frame, cloud, poses[a],
+                    _NEAR_M,
+                )  # fmt: skip
+            holds = near > 0 and near >= _FITS * (near + free) and near + free >= _KNOWN * len(cloud)
+            fits[a] = near / (near + free) if holds else 0.0
+            a = take(line, a)
 
 
 def consistent(closures: list[Closure], path: Floats, way: Floats) -> NDArray[np.bool_]:
@@ -207,18 +229,18 @@ def consistent(closures: list[Closure], path: Floats, way: Floats) -> NDArray[np
     anchors, keys = np.array([c.anchor for c in closures]), np.array([c.key for c in closures])
     seen = np.array([c.seen for c in closures])
     merit = np.array([c.fit for c in closures]) ** _MERIT
+    apart = np.abs(way[keys] - way[keys][:, None]) + np.abs(way[anchors] - way[anchors][:, None])
+    np.fill_diagonal(apart, np.inf)
+    one, others = np.nonzero(apart < _CROWD_M)
+    from_anchor = inverse(between(path[anchors[one]], path[anchors[others]]))
+    expected = compose(compose(from_anchor, seen[one]), between(path[keys[one]], path[keys[others]]))
+    error, far = expected - seen[others], apart[one, others]
+    same = (np.hypot(error[:, 0], error[:, 1]) < 0.25 + 0.03 * far) & (
+        np.abs(wrapped(error[:, 2])) < 0.05 + 0.003 * far
+    )
     agree, contradict = np.zeros((count, count), dtype=bool), np.zeros((count, count), dtype=bool)
-    for n in range(count):
-        apart = np.abs(way[keys] - way[keys[n]]) + np.abs(way[anchors] - way[anchors[n]])
-        others = np.flatnonzero((apart < _CROWD_M) & (np.arange(count) != n))
-        from_anchor = inverse(between(path[anchors[n]][None], path[anchors[others]]))
-        expected = compose(compose(from_anchor, seen[n][None]), between(path[keys[n]][None], path[keys[others]]))
-        error = expected - seen[others]
-        same = (np.hypot(error[:, 0], error[:, 1]) < 0.25 + 0.03 * apart[others]) & (
-            np.abs(wrapped(error[:, 2])) < 0.05 + 0.003 * apart[others]
-        )
-        agree[n, others[same]] = True
-        contradict[n, others[~same]] = True
+    agree[one[same], others[same]] = True
+    contradict[one[~same], others[~same]] = True
     support = agree @ merit + merit
     rival = np.where(contradict | contradict.T, support, 0.0).max(axis=1)
     kept: NDArray[np.bool_] = (agree.sum(axis=1) >= 2) & (support > _CLEARLY * rival)

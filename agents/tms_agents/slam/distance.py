@@ -10,6 +10,7 @@ from numba import njit, prange
 
 from tms_agents.slam.geometry import Bytes, Floats, Ints
 from tms_agents.slam.occupancy import EVEN
+from tms_agents.slam.sharing import queue, take
 from tms_agents.slam.tiles import MASK, SHIFT
 
 #: The square of the radius has to fit into a byte.
@@ -32,23 +33,27 @@ def mark_discs(
 ) -> None:
     """Numbers of the tiles that are nearer than ``radius`` cells to the cells ``changed[n, :changes[n]]`` (see
     `write_rays`)."""
-    for n in prange(len(changes)):
-        count = 0
-        for k in range(changes[n]):
-            cell = changed[n, k]
-            if cell < 0:
-                cell = -1 - cell
-            x, y = cell % (width << SHIFT), cell // (width << SHIFT)
-            for ty in range(max(0, y - radius + 1) >> SHIFT, min(height - 1, (y + radius - 1) >> SHIFT) + 1):
-                for tx in range(max(0, x - radius + 1) >> SHIFT, min(width - 1, (x + radius - 1) >> SHIFT) + 1):
-                    place = ty * width + tx
-                    if seen[n, place] == 0:
-                        seen[n, place] = 1
-                        wanted[n, count] = place
-                        count += 1
-        for k in range(count):
-            seen[n, wanted[n, k]] = 0
-        counts[n] = count
+    line = queue(len(changes))
+    for begin in prange(len(changes)):
+        n = take(line, begin)
+        while n < len(changes):
+            count = 0
+            for k in range(changes[n]):
+                cell = changed[n, k]
+                if cell < 0:
+                    cell = -1 - cell
+                x, y = cell % (width << SHIFT), cell // (width << SHIFT)
+                for ty in range(max(0, y - radius + 1) >> SHIFT, min(height - 1, (y + radius - 1) >> SHIFT) + 1):
+                    for tx in range(max(0, x - radius + 1) >> SHIFT, min(width - 1, (x + radius - 1) >> SHIFT) + 1):
+                        place = ty * width + tx
+                        if seen[n, place] == 0:
+                            seen[n, place] = 1
+                            wanted[n, count] = place
+                            count += 1
+            for k in range(count):
+                seen[n, wanted[n, k]] = 0
+            counts[n] = count
+            n = take(line, n)
 
 
 @njit(cache=True, parallel=True)
@@ -63,8 +68,12 @@ def update_distances(
 ) -> None:
     """Bring the fields (N, H, W) up to date after the cells ``changed[n, :changes[n]]`` became occupied or ceased to
     be."""
-    for n in prange(len(changes)):
-        _update(directory[n], squared, occupancy_directory[n], occupancy, offsets, changed[n, : changes[n]])
+    line = queue(len(changes))
+    for begin in prange(len(changes)):
+        n = take(line, begin)
+        while n < len(changes):
+            _update(directory[n], squared, occupancy_directory[n], occupancy, offsets, changed[n, : changes[n]])
+            n = take(line, n)
 
 
 @njit(cache=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,9 @@ from tms_agents.slam.geometry import Bytes, Floats
 from tms_agents.slam.maps import Maps
 from tms_agents.slam.occupancy import UNKNOWN, probability
 from tms_agents.slam.tiles import SIDE
+
+#: So many scans are written at a time: each becomes as long as the longest of them.
+_TOGETHER = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,12 +30,15 @@ class GridMap:
 
 
 def render(
-    poses: Floats, scans: Iterable[Floats], laser: Floats, resolution: float, reach: float, fields: bool = True
+    poses: Floats, scans: Sequence[Floats], laser: Floats, resolution: float, reach: float, fields: bool = True
 ) -> Maps:
     """One map of all ``scans`` ((M, 2) points seen from the robot) at ``poses`` (K, 3), with distances or without."""
     maps = Maps(1, resolution, reach)
-    for pose, points in zip(poses, scans, strict=True):
-        maps.integrate(pose[None], points, laser, fields)
+    for first in range(0, len(poses), _TOGETHER):
+        some = slice(first, first + _TOGETHER)
+        maps.integrate_all([poses[some]], [scans[some]], laser)
+    if fields:
+        maps.measure()
     return maps
 
 

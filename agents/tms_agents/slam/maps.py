@@ -8,7 +8,7 @@ import numpy as np
 
 from tms_agents.slam.distance import LARGEST_RADIUS, disc, mark_discs, update_distances
 from tms_agents.slam.geometry import Bytes, Floats, Ints
-from tms_agents.slam.occupancy import UNKNOWN, mark_rays, write_rays
+from tms_agents.slam.occupancy import UNKNOWN, list_occupied, mark_rays, write_rays
 from tms_agents.slam.tiles import SIDE, TiledMaps
 
 #: Change so many cells per beam at most become free in one scan; the others wait for the next one.
@@ -30,46 +30,63 @@ class Maps:
         self.metres: Floats = np.minimum(np.sqrt(np.arange(256.0)), self.radius) * resolution
         self._offsets = disc(self.radius)
 
-    def integrate(self, poses: Floats, points: Floats, laser: Floats, fields: bool = True) -> None:
+    def integrate(self, poses: Floats, points: Floats, laser: Floats) -> None:
         """Write one scan into every map: ``points`` (M, 2) where beams from ``laser`` (2,) ended, seen from ``poses``
-        (N, 3). Without ``fields``, distances are no longer kept up."""
-        self._integrate(poses, points[None], np.array([len(points)], dtype=np.int32), laser, fields)
+        (N, 3)."""
+        first, which = np.arange(len(poses) + 1, dtype=np.int32), np.zeros(len(poses), dtype=np.int32)
+        lengths: Ints = np.array([len(points)], dtype=np.int32)
+        self._change_distances(*self._write(first, poses, which, points[None], lengths, laser))
 
-    def integrate_each(self, poses: Floats, scans: Sequence[Floats], laser: Floats) -> None:
-        """Write a scan of its own, (M, 2) points, into each of the N maps."""
-        points, lengths = padded(scans)
-        self._integrate(poses, points, lengths, laser, True)
+    def integrate_all(self, poses: Sequence[Floats], scans: Sequence[Sequence[Floats]], laser: Floats) -> None:
+        """Write scans of its own into each map n: ``scans[n]`` of (M, 2) points seen from ``poses[n]`` (K, 3), in their
+        order. Distances are not kept up until `measure`."""
+        first: Ints = np.cumsum([0, *map(len, scans)], dtype=np.int32)
+        points, lengths = padded([points for mine in scans for points in mine])
+        which: Ints = np.arange(len(points), dtype=np.int32)
+        self._write(first, np.concatenate(poses), which, points, lengths, laser)
 
-    def _integrate(self, poses: Floats, points: Floats, lengths: Ints, laser: Floats, fields: bool) -> None:
+    def measure(self) -> None:
+        """All distances anew: cheaper once, after many scans, than after each."""
+        n, height, width = self.occupancy.directory.shape
+        occupied, counts = np.empty((n, 0), dtype=np.int32), np.empty(n, dtype=np.int32)
+        list_occupied(self.occupancy.directory, self.occupancy.cells, occupied, counts)
+        occupied = np.empty((n, int(counts.max())), dtype=np.int32)
+        list_occupied(self.occupancy.directory, self.occupancy.cells, occupied, counts)
+        self.distance.clear()
+        seen: Bytes = np.zeros((n, height * width), dtype=np.uint8)
+        self._change_distances(occupied, counts, seen, np.empty(seen.shape, dtype=np.int32))
+
+    def _write(
+        self, first: Ints, poses: Floats, which: Ints, points: Floats, lengths: Ints, laser: Floats
+    ) -> tuple[Ints, Ints, Bytes, Ints]:
+        """Occupancy alone, as in `write_rays`: the cells that changed by the last scans, how many, and scratch."""
         reach = float(np.hypot(points[..., 0], points[..., 1]).max(initial=0.0)) + float(np.hypot(*laser))
         self._include(poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
-        n, height, width = self.occupancy.directory.shape
+        occupancy, (n, height, width) = self.occupancy, self.occupancy.directory.shape
         across = 2 * int(reach / (SIDE * self.resolution)) + 5
+        most = min(height * width, int(np.diff(first).max()) * across * across)
         seen: Bytes = np.zeros((n, height * width), dtype=np.uint8)
-        wanted: Ints = np.empty((n, min(height * width, across * across)), dtype=np.int32)
+        wanted: Ints = np.empty((n, most), dtype=np.int32)
         counts: Ints = np.empty(n, dtype=np.int32)
-        mark_rays(width, poses, points, lengths, laser, self.frame, seen, wanted, counts)
-        self.occupancy.make_writable(wanted, counts)
+        mark_rays(width, first, poses, which, points, lengths, laser, self.frame, seen, wanted, counts)
+        occupancy.make_writable(wanted, counts)
         changed: Ints = np.empty((n, _CHANGES_PER_BEAM * max(1, points.shape[1])), dtype=np.int32)
-        changes: Ints = np.empty(n, dtype=np.int32)
         beams = np.hypot(points[..., 0] - laser[0], points[..., 1] - laser[1])
         capacity = int((beams * self.frame[2] + 4).sum(axis=1).max(initial=0.0))
-        occupancy, distance = self.occupancy, self.distance
         write_rays(
-            occupancy.directory, occupancy.cells, poses, points, lengths, laser, self.frame, capacity, changed, changes
-        )
-        if not fields:
-            return
+            occupancy.directory, occupancy.cells, first, poses, which, points, lengths, laser, self.frame, capacity,
+            changed, counts,
+        )  # fmt: skip
+        return changed, counts, seen, wanted
+
+    def _change_distances(self, changed: Ints, changes: Ints, seen: Bytes, wanted: Ints) -> None:
+        """After cells ``changed[n, :changes[n]]`` (see `write_rays`); ``seen`` is zeros, ``wanted`` has room."""
+        occupancy, distance = self.occupancy, self.distance
+        counts, (_, height, width) = np.empty(len(changes), dtype=np.int32), distance.directory.shape
         mark_discs(height, width, self.radius, changed, changes, seen, wanted, counts)
         distance.make_writable(wanted, counts)
         update_distances(
-            distance.directory,
-            distance.cells,
-            occupancy.directory,
-            occupancy.cells,
-            self._offsets,
-            changed,
-            changes,
+            distance.directory, distance.cells, occupancy.directory, occupancy.cells, self._offsets, changed, changes
         )
 
     def resample(self, parents: Ints) -> None:

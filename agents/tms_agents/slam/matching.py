@@ -18,6 +18,7 @@ from tms_agents.slam.agreement import agreement
 from tms_agents.slam.correlative import search
 from tms_agents.slam.distance import field_at
 from tms_agents.slam.geometry import Bytes, Floats, Ints, wrap
+from tms_agents.slam.sharing import queue, take
 
 #: Columns of the results of a match beside the pose: cost of the scan alone (tempered), of scan and prior, share of
 #: beams that end near a surface.
@@ -58,20 +59,25 @@ def match_all(
     share of the beams than ``poor_share`` fits what the map knows, it is tried whether the odometry jumped.
     """
     costs = np.log(1.0 + (metres / sigma) ** 2)
-    for n in prange(len(starts)):
-        match(
-            directory[n], squared, metres, frame, points, starts[n], priors[n], precision[n], sigma, temperature,
-            poses[n], hessians[n], results[n],
-        )  # fmt: skip
-        if results[n, SHARE] < poor_share:
-            near, free = agreement(
-                occupancy_directory[n], occupancy, directory[n], squared, metres, frame, points, poses[n], 2.0 * sigma
-            )
-            if near < poor_share * (near + free):
-                _match_after_slip(
-                    directory[n], squared, metres, frame, points, priors[n], precision[n], sigma, temperature, costs,
-                    poses[n], hessians[n], results[n],
+    line = queue(len(starts))
+    for begin in prange(len(starts)):
+        n = take(line, begin)
+        while n < len(starts):
+            match(
+                directory[n], squared, metres, frame, points, starts[n], priors[n], precision[n], sigma, temperature,
+                poses[n], hessians[n], results[n],
+            )  # fmt: skip
+            if results[n, SHARE] < poor_share:
+                near, free = agreement(
+                    occupancy_directory[n], occupancy, directory[n], squared, metres, frame, points, poses[n],
+                    2.0 * sigma,
                 )  # fmt: skip
+                if near < poor_share * (near + free):
+                    _match_after_slip(
+                        directory[n], squared, metres, frame, points, priors[n], precision[n], sigma, temperature,
+                        costs, poses[n], hessians[n], results[n],
+                    )  # fmt: skip
+            n = take(line, n)
 
 
 @njit(cache=True)
@@ -166,12 +172,16 @@ def curvatures(
 ) -> None:
     """``hessians`` (A, 3, 3) of the cost of scans (A, M, 2), of which the first ``lengths`` (A,) points count, at
     ``poses`` (A, 3) in maps ``which`` (A,), with priors of ``precision`` (A, 3, 3) just there."""
-    for a in prange(len(which)):
-        gradient, result = np.empty(3), np.empty(3)
-        linearise(
-            directory[which[a]], squared, metres, frame, points[a, : lengths[a]], poses[a], poses[a], precision[a],
-            sigma, 1.0, hessians[a], gradient, result,
-        )  # fmt: skip
+    line = queue(len(which))
+    for begin in prange(len(which)):
+        a = take(line, begin)
+        while a < len(which):
+            gradient, result = np.empty(3), np.empty(3)
+            linearise(
+                directory[which[a]], squared, metres, frame, points[a, : lengths[a]], poses[a], poses[a], precision[a],
+                sigma, 1.0, hessians[a], gradient, result,
+            )  # fmt: skip
+            a = take(line, a)
 
 
 @njit(cache=True)

@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit, prange
 
 from tms_agents.slam.geometry import Bytes, Floats, Ints
-from tms_agents.slam.tiles import MASK, SHIFT
+from tms_agents.slam.sharing import queue, take
+from tms_agents.slam.tiles import MASK, SHIFT, SIDE
 
 UNKNOWN, EVEN = 0, 64
 HIT, MISS, LOWEST, HIGHEST = 9, 4, EVEN - 20, EVEN + 35
@@ -27,7 +28,9 @@ def probability(cells: Bytes) -> Floats:
 @njit(cache=True, parallel=True)
 def mark_rays(
     width: int,
+    first: Ints,
     poses: Floats,
+    which: Ints,
     points: Floats,
     lengths: Ints,
     laser: Floats,
@@ -36,22 +39,34 @@ def mark_rays(
     wanted: Ints,
     counts: Ints,
 ) -> None:
-    """Numbers of the tiles that rays from ``laser`` (2,) to points pass, into ``wanted`` (N, K) and ``counts``.
+    """Numbers of the tiles that rays from ``laser`` (2,) to points pass, into ``wanted`` (N, L) and ``counts`` (N,).
 
-    ``points`` (P, M, 2), of which the first ``lengths`` (P,) count, are of one scan for all maps or of one for each (P
-    = 1 or N), seen from ``poses`` (N, 3); ``frame`` is (x, y of the lower left corner in m, cells per m). ``seen``
-    (N, H * W) is scratch of zeros and is zeros again afterwards; ``width`` is W in tiles.
+    Map n gets scans ``first[n]`` up to ``first[n + 1]`` (not included): scan k are the first ``lengths[p]`` of
+    ``points`` (P, M, 2), p being ``which[k]``, seen from ``poses[k]`` (K, 3). ``frame`` is (x, y of the lower left
+    corner in m, cells per m). ``seen`` (N, H * W) is scratch of zeros and is zeros again afterwards; ``width`` is W in
+    tiles.
     """
-    for n in prange(len(poses)):
-        p = int(min(np.int64(n), np.int64(len(points) - 1)))
-        counts[n] = _mark(width, poses[n], points[p, : lengths[p]], laser, frame, seen[n], wanted[n])
+    line = queue(len(counts))
+    for begin in prange(len(counts)):
+        n = take(line, begin)
+        while n < len(counts):
+            count = 0
+            for k in range(first[n], first[n + 1]):
+                mine = points[which[k], : lengths[which[k]]]
+                count = _mark(width, poses[k], mine, laser, frame, seen[n], wanted[n], count)
+            for k in range(count):
+                seen[n, wanted[n, k]] = 0
+            counts[n] = count
+            n = take(line, n)
 
 
 @njit(cache=True, parallel=True)
 def write_rays(
     directory: Ints,
     cells: Bytes,
+    first: Ints,
     poses: Floats,
+    which: Ints,
     points: Floats,
     lengths: Ints,
     laser: Floats,
@@ -60,16 +75,42 @@ def write_rays(
     changed: Ints,
     counts: Ints,
 ) -> None:
-    """Hits and misses of one scan, as in `mark_rays`, into the maps (N, H, W), whose tiles along the rays are theirs
+    """Hits and misses of scans, as in `mark_rays`, into the maps (N, H, W), whose tiles along the rays are theirs
     alone.
 
-    ``changed`` (N, L) gets the cells (y * width in cells + x) that became occupied, and as -1 - cell those that ceased
-    to be. No scan touches more than ``capacity`` cells.
+    ``changed`` (N, L) gets the cells (y * width in cells + x) that became occupied by the last scan of each map, and as
+    -1 - cell those that ceased to be. No scan touches more than ``capacity`` cells.
     """
-    for n in prange(len(poses)):
-        p = int(min(np.int64(n), np.int64(len(points) - 1)))
-        mine = points[p, : lengths[p]]
-        counts[n] = _write(directory[n], cells, poses[n], mine, laser, frame, capacity, changed[n])
+    line = queue(len(counts))
+    for begin in prange(len(counts)):
+        n = take(line, begin)
+        while n < len(counts):
+            counts[n] = 0
+            for k in range(first[n], first[n + 1]):
+                mine = points[which[k], : lengths[which[k]]]
+                counts[n] = _write(directory[n], cells, poses[k], mine, laser, frame, capacity, changed[n])
+            n = take(line, n)
+
+
+@njit(cache=True, parallel=True)
+def list_occupied(directory: Ints, cells: Bytes, found: Ints, counts: Ints) -> None:
+    """Occupied cells (y * width in cells + x) of the maps (N, H, W), as many as there is room for in ``found`` (N, L);
+    ``counts`` (N,) is how many there are."""
+    width = directory.shape[2] << SHIFT
+    line = queue(len(counts))
+    for begin in prange(len(counts)):
+        n = take(line, begin)
+        while n < len(counts):
+            count, tiles = 0, directory[n].ravel()
+            for t in np.flatnonzero(tiles):
+                left, bottom = (t % directory.shape[2]) << SHIFT, (t // directory.shape[2]) << SHIFT
+                for place in range(SIDE * SIDE):
+                    if cells[tiles[t], place] > EVEN:
+                        if count < found.shape[1]:
+                            found[n, count] = (bottom + (place >> SHIFT)) * width + left + (place & MASK)
+                        count += 1
+            counts[n] = count
+            n = take(line, n)
 
 
 @njit(cache=True)
@@ -103,10 +144,11 @@ def _line(x0: int, y0: int, x1: int, y1: int) -> tuple[bool, int, int, int, int,
 
 
 @njit(cache=True)
-def _mark(width: int, pose: Floats, points: Floats, laser: Floats, frame: Floats, seen: Bytes, wanted: Ints) -> int:
-    """Tile by tile along the longer axis: across, the cells rise or fall steadily, so the ends of each part tell
-    all."""
-    count = 0
+def _mark(
+    width: int, pose: Floats, points: Floats, laser: Floats, frame: Floats, seen: Bytes, wanted: Ints, count: int
+) -> int:
+    """Tile by tile along the longer axis: across, the cells rise or fall steadily, so the ends of each part tell all.
+    ``count`` are wanted already."""
     for m in range(len(points)):
         x0, y0, x1, y1 = _ray(pose, points[m], laser, frame)
         steep, steps, along, sign, across, slope = _line(x0, y0, x1, y1)
@@ -131,8 +173,6 @@ def _mark(width: int, pose: Floats, points: Floats, laser: Floats, frame: Floats
             seen[place] = 1
             wanted[count] = place
             count += 1
-    for k in range(count):
-        seen[wanted[k]] = 0
     return count
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats, Ints
 from tms_agents.slam.keyframes import Indices
+from tms_agents.slam.sharing import queue, take
 
 Mask = NDArray[np.bool_]
 
@@ -64,29 +65,33 @@ def mark_people(
     ``unsure`` (2, 2) times what was driven between: m per m and per rad, rad per m and per rad. What holds only if the
     poses are right is not said.
     """
-    for k in prange(len(keys)):
-        mine = slice(first[k], first[k + 1])
-        wrong = np.zeros((2, before.shape[1], 2))
-        for side in range(2):
-            for w in range(before.shape[1]):
-                scan = before[k, w] if side == 0 else after[k, w]
-                for i in range(2):
-                    apart = abs(driven[scan, i] - driven[keys[k], i])
-                    wrong[side, w, 0] += unsure[0, i] * apart
-                    wrong[side, w, 1] += unsure[1, i] * apart
-        moving = np.zeros(first[k + 1] - first[k], dtype=np.bool_)
-        for m in range(len(moving)):
-            x, y = points[first[k] + m]
-            if beams[first[k] + m] > _FARTHEST_M:
-                continue
-            earlier = _told(x, y, poses, bearings, ranges, range_max, before[k], wrong[0])
-            if earlier == MIXED:
-                continue
-            later = _told(x, y, poses, bearings, ranges, range_max, after[k], wrong[1])
-            moving[m] = later != MIXED and (earlier == FREE or later == FREE)
-        _whole(points[mine], beams[mine], moving, found[mine])
-        if np.count_nonzero(found[mine]) > _CROWD * len(moving):
-            found[mine] = False
+    line = queue(len(keys))
+    for begin in prange(len(keys)):
+        k = take(line, begin)
+        while k < len(keys):
+            mine = slice(first[k], first[k + 1])
+            wrong = np.zeros((2, before.shape[1], 2))
+            for side in range(2):
+                for w in range(before.shape[1]):
+                    scan = before[k, w] if side == 0 else after[k, w]
+                    for i in range(2):
+                        apart = abs(driven[scan, i] - driven[keys[k], i])
+                        wrong[side, w, 0] += unsure[0, i] * apart
+                        wrong[side, w, 1] += unsure[1, i] * apart
+            moving = np.zeros(first[k + 1] - first[k], dtype=np.bool_)
+            for m in range(len(moving)):
+                x, y = points[first[k] + m]
+                if beams[first[k] + m] > _FARTHEST_M:
+                    continue
+                earlier = _told(x, y, poses, bearings, ranges, range_max, before[k], wrong[0])
+                if earlier == MIXED:
+                    continue
+                later = _told(x, y, poses, bearings, ranges, range_max, after[k], wrong[1])
+                moving[m] = later != MIXED and (earlier == FREE or later == FREE)
+            _whole(points[mine], beams[mine], moving, found[mine])
+            if np.count_nonzero(found[mine]) > _CROWD * len(moving):
+                found[mine] = False
+            k = take(line, k)
 
 
 @njit(cache=True)

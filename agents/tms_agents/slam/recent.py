@@ -41,8 +41,7 @@ def recent_path(path: Floats, keys: KeyScans, settings: Settings, lights: Sequen
         if way[k] - way[begun] > 2 * _RECENT_M:
             begun = min(int(np.searchsorted(way, way[k] - _RECENT_M)), k - 1)
             newest = _Newest(keys, settings, lights)
-            for old in range(begun, k):
-                newest.add(old, found[old])
+            newest.begin(range(begun, k), found)
         found[k] = newest.matched(k, found[k - 1], np.stack([motions[k - 1], steps[k - 1]]), noise[k - 1])
         newest.add(k, found[k])
     return found
@@ -57,12 +56,22 @@ class _Newest:
         self._maps = Maps(_STARTS, settings.resolution, settings.reach_m)
         self._light = None if lights is None else ParticleLight(replace(settings, particles=_STARTS))
 
+    def begin(self, numbers: range, path: Floats) -> None:
+        """With key scans ``numbers`` along ``path`` (K, 3)."""
+        poses, scans = path[numbers.start : numbers.stop], self._keys.scans[numbers.start : numbers.stop]
+        self._maps.integrate_all([poses] * _STARTS, [scans] * _STARTS, self._laser)
+        self._maps.measure()
+        for k in numbers:
+            self._add_light(k, path[k])
+
     def add(self, k: int, pose: Floats) -> None:
         """Key scan ``k``, seen from ``pose`` (3,)."""
-        poses = np.tile(pose, (_STARTS, 1))
-        self._maps.integrate(poses, self._keys.scans[k], self._laser)
+        self._maps.integrate(np.tile(pose, (_STARTS, 1)), self._keys.scans[k], self._laser)
+        self._add_light(k, pose)
+
+    def _add_light(self, k: int, pose: Floats) -> None:
         if self._light is not None and self._lights is not None:
-            self._light.integrate(poses, self._lights[k])
+            self._light.integrate(np.tile(pose, (_STARTS, 1)), self._lights[k])
 
     def matched(self, k: int, before: Floats, motions: Floats, noise: Floats) -> Floats:
         """Where key scan ``k`` fits best: from ``before`` (3,) on by ``motions`` (2, 3), the first of which is that of

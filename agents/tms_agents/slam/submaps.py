@@ -59,16 +59,13 @@ class Submaps:
         return self._rendered[group]
 
     def _render(self, numbers: range) -> Maps:
-        """Side by side, scan by scan; a submap of fewer scans than others gets none in the end."""
+        """Side by side."""
         s, scans = self._settings, self.keys.scans
         maps = Maps(len(numbers), s.resolution, s.reach_m)
-        laser = np.ascontiguousarray(self.keys.laser)
-        firsts, ends = self.first[numbers.start : numbers.stop], self.first[numbers.start + 1 : numbers.stop + 1]
-        anchors = self.path[self.anchors[numbers.start : numbers.stop]]
-        for step in range(int((ends - firsts).max())):
-            keys = np.minimum(firsts + step, ends - 1)
-            seen = [scans[int(key)] if firsts[n] + step < ends[n] else _NOTHING for n, key in enumerate(keys)]
-            maps.integrate_each(between(anchors, self.path[keys]), seen, laser)
+        members = [range(self.first[number], self.first[number + 1]) for number in numbers]
+        poses = [between(self.path[self.anchors[n]], self.path[list(m)]) for n, m in zip(numbers, members, strict=True)]
+        maps.integrate_all(poses, [[scans[key] for key in m] for m in members], np.ascontiguousarray(self.keys.laser))
+        maps.measure()
         return maps
 
     def cloud(self, key: int, around: int, most: int) -> Floats:
@@ -89,9 +86,6 @@ class Submaps:
             if len(chosen) <= most:
                 return np.ascontiguousarray(points[np.sort(chosen)])
             cell *= 1.25
-
-
-_NOTHING: Floats = np.zeros((0, 2))
 
 
 def pyramids(maps: Maps, which: Ints, sigma: float) -> tuple[Bytes, Floats, float]:

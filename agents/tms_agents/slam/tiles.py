@@ -22,6 +22,8 @@ SHIFT = 5
 SIDE = 1 << SHIFT
 MASK = SIDE - 1
 _CELLS = SIDE * SIDE
+#: Tiles there is room for at first.
+_FIRST = 256
 
 
 class TiledMaps:
@@ -34,11 +36,11 @@ class TiledMaps:
         self, maps: int, blank: float, height: int, width: int, *, layers: int = 1, dtype: type[np.generic] = np.uint8
     ) -> None:
         self.directory: Ints = np.zeros((maps, height, width), dtype=np.int32)
-        self.cells: Cells = np.full((64, layers * _CELLS), blank, dtype=dtype)
-        self.references: Ints = np.zeros(64, dtype=np.int32)
+        self.cells: Cells = np.full((_FIRST, layers * _CELLS), blank, dtype=dtype)
+        self.references: Ints = np.zeros(_FIRST, dtype=np.int32)
         self.blank = blank
-        self._free: Ints = np.arange(63, 0, -1, dtype=np.int32)  # a stack, its top at [_unused - 1]
-        self._unused = 63
+        self._free: Ints = np.arange(_FIRST - 1, 0, -1, dtype=np.int32)  # a stack, its top at [_unused - 1]
+        self._unused = _FIRST - 1
 
     @property
     def tiles_used(self) -> int:

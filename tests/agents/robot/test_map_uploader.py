@@ -13,8 +13,9 @@ import pytest
 from server_process import ServerProcess
 
 from tms_agents.commands import slam
-from tms_agents.robot.map_uploader import MapUploader
+from tms_agents.robot.map_uploader import Grid, MapUploader
 from tms_agents.simulation.building import Drive, carmen, drive
+from tms_agents.simulation.coloured_drive import record
 from tms_client import Conflict, Town, Unreachable
 from tms_client.cli import CommandError
 from tms_client.flows import NO_RETRY
@@ -71,22 +72,22 @@ def test_at_a_modest_rate_and_through_a_restart(tmp_path):
         uploader, town = made(server.url, clock, said)
         for columns in range(10, 110, 10):  # a scan each second
             clock.now += 1.0
-            uploader.offer(lambda columns=columns: grown(columns))
+            uploader.offer(lambda columns=columns: Grid(*grown(columns)))
         assert uploader.versions == 2
         assert fetched(server.url) == (2, 100 * 100)
         server.kill()
         for columns in range(110, 160, 10):
             clock.now += 1.0
-            uploader.offer(lambda columns=columns: grown(columns))
+            uploader.offer(lambda columns=columns: Grid(*grown(columns)))
         assert len(said) == 1
         assert said[0].startswith("map corridor waits for the server")
         with pytest.raises(Unreachable):
-            uploader.finish(grown(160), 2.0)
+            uploader.finish(Grid(*grown(160)), 2.0)
         with ServerProcess(tmp_path, port=port) as again:
             assert fetched(again.url) == (2, 100 * 100)  # nothing acknowledged was lost
             clock.now += 10.0
-            uploader.offer(lambda: grown(170))
-            assert uploader.finish(grown(200), 10.0).version == 4
+            uploader.offer(lambda: Grid(*grown(170)))
+            assert uploader.finish(Grid(*grown(200)), 10.0).version == 4
             assert said[1:] == ["the server is back; map corridor is at version 3"]
             assert fetched(again.url) == (4, 200 * 100)
             town.close()
@@ -97,13 +98,13 @@ def test_a_version_of_ones_own_is_built_on_and_that_of_others_is_not(tmp_path):
         prepare(server.url)
         clock = Clock()
         uploader, town = made(server.url, clock, [])
-        assert uploader.finish(grown(10), 0.0).version == 1
+        assert uploader.finish(Grid(*grown(10)), 0.0).version == 1
         with Town(server.url) as other:
             other.maps.upload("corridor", *grown(20), agent="robot")  # as one whose answer was lost
-            assert uploader.finish(grown(30), 0.0).version == 3
+            assert uploader.finish(Grid(*grown(30)), 0.0).version == 3
             other.maps.upload("corridor", *grown(40), agent="somebody", base=3)
         with pytest.raises(Conflict):
-            uploader.finish(grown(50), 0.0)
+            uploader.finish(Grid(*grown(50)), 0.0)
         town.close()
 
 
@@ -111,7 +112,7 @@ def test_a_version_of_ones_own_is_built_on_and_that_of_others_is_not(tmp_path):
 def test_the_mapper_uploads_while_it_works(tmp_path, capsys):
     log = tmp_path / "drive.log"
     log.write_text("\n".join(carmen(drive("block", Drive(seed=3, step_m=0.6)))[:121]))
-    command = ["run", str(log), "--out", str(tmp_path / "out"), "--particles", "3", "--upload", "corridor"]
+    command = ["run", str(log), "--out", str(tmp_path / "out"), "--particles", "30", "--upload", "corridor"]
     with ServerProcess(tmp_path / "data") as server:
         with pytest.raises(CommandError, match="--room"):
             slam.main([*command, "--url", server.url])
@@ -138,3 +139,24 @@ def test_the_mapper_uploads_while_it_works(tmp_path, capsys):
     with pytest.raises(CommandError, match="corridor"):
         slam.main([*command, "--room", "lab", "--url", server.url])
     assert Path(tmp_path / "out" / "map.npz").exists()
+
+
+@pytest.mark.timeout(300)
+def test_light_goes_with_the_map(tmp_path):
+    made = record("corridor", 5)
+    (tmp_path / "stream.jsonl").write_text("\n".join(made.lines[:400]))
+    (tmp_path / "models.json").write_text(made.models)
+    files = [str(tmp_path / "stream.jsonl"), "--out", str(tmp_path / "out")]
+    command = ["run", *files, "--particles", "30", "--intensity"]
+    with ServerProcess(tmp_path / "data") as server:
+        prepare(server.url)
+        assert slam.main([*command, "--upload", "corridor", "--upload-every", "0.1", "--url", server.url]) == 0
+        with Town(server.url) as town:
+            newest, first = town.map("corridor"), town.map("corridor", version=1)
+    written = np.load(tmp_path / "out" / "imap.npy")
+    assert newest.version > 1
+    assert newest.intensity is not None
+    assert first.intensity is not None
+    assert 0 < np.isfinite(first.intensity.mean).sum() < np.isfinite(written).sum()
+    np.testing.assert_allclose(np.nanmean(newest.intensity.mean), np.nanmean(written), rtol=1e-4)
+    assert np.isfinite(newest.intensity.mean).sum() == np.isfinite(written).sum()

@@ -84,6 +84,18 @@ def test_the_picture_is_a_png(done):
     assert len(zlib.decompress(data[41 : 41 + length])) == height * (1 + 3 * width)
 
 
+def test_compare_looks_at_the_time_both_have(done, tmp_path, capsys):
+    lines = (done / "out" / "trajectory.txt").read_text().splitlines()
+    part = tmp_path / "part.txt"
+    part.write_text("\n".join(lines[: len(lines) // 2]))
+    assert slam.main(["compare", str(part), str(done / "out")]) == 0
+    assert ": 0.0000 +- 0.0000 m" in capsys.readouterr().out
+    late = tmp_path / "late.txt"
+    late.write_text("99999 0 0 0\n100000 1 0 0\n")
+    with pytest.raises(CommandError, match="no time in common"):
+        slam.main(["compare", str(part), str(late)])
+
+
 def test_compare_with_itself_and_with_relations(done, driven, capsys):
     out = done / "out"
     assert slam.main(["compare", str(out), str(out / "trajectory.txt")]) == 0

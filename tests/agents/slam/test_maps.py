@@ -11,6 +11,7 @@ from scipy.ndimage import distance_transform_edt
 from tms_agents.slam.geometry import transform
 from tms_agents.slam.maps import Maps
 from tms_agents.slam.occupancy import EVEN, UNKNOWN
+from tms_agents.slam.tiles import TiledMaps
 
 LASER = np.array([0.1, 0.05])
 
@@ -42,6 +43,26 @@ def test_the_field_is_the_distance_to_the_nearest_occupied_cell(seed, count, res
         if occupied.any():
             expected = np.minimum(expected, np.round(distance_transform_edt(~occupied) ** 2))
         np.testing.assert_array_equal(maps.distance.dense(n), expected)
+
+
+def test_all_at_once_is_scan_by_scan():
+    scans = random_scans(7, 6, 3)
+    one, other = Maps(3, 0.05, 0.5), Maps(3, 0.05, 0.5)
+    for poses, points in scans:
+        one.integrate(poses, points, LASER)
+    other.integrate_all([np.array([p[n] for p, _ in scans]) for n in range(3)], [[q for _, q in scans]] * 3, LASER)
+    assert other.distance.tiles_used == 0
+    other.measure()
+    shift = np.round((one.frame[:2] - other.frame[:2]) / 0.05).astype(int)
+    for n in range(3):
+        for mine, its in ((one.occupancy, other.occupancy), (one.distance, other.distance)):
+            found = {tuple(cell + shift): mine.dense(n)[*cell[::-1]] for cell in _told(mine, n)}
+            assert found == {tuple(cell): its.dense(n)[*cell[::-1]] for cell in _told(its, n)}
+
+
+def _told(tiles: TiledMaps, n: int) -> np.ndarray:
+    """(x, y) of the cells of map ``n`` that say something."""
+    return np.argwhere(tiles.dense(n) != tiles.blank)[:, ::-1]
 
 
 def test_walls_appear_and_vanish_so_the_field_is_told_of_both():

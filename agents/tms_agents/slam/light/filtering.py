@@ -13,10 +13,11 @@ from tms_agents.slam.settings import Settings
 
 
 class ParticleLight:
-    """The maps of light of all particles, and matches refined with them."""
+    """The maps of light of all particles, and matches refined with them; ``scans`` are those in the maps."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
+        self.scans: list[LightScan] = []
         self.maps = LightMaps(settings.particles, settings.light_m)
 
     def refine(
@@ -43,6 +44,7 @@ class ParticleLight:
     def integrate(self, poses: Floats, scan: LightScan) -> None:
         """One scan into every map."""
         self.maps.integrate(poses, scan)
+        self.scans.append(scan)
 
     def resample(self, parents: Ints) -> None:
         """Particle n goes on from where particle ``parents[n]`` was."""

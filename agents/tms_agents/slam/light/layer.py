@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tms_agents.slam.geometry import Bytes, Floats, Ints
 from tms_agents.slam.light.scans import LightScan
 from tms_agents.slam.maps import grown
+from tms_agents.slam.sharing import queue, take
 from tms_agents.slam.tiles import MASK, SHIFT, SIDE, TiledMaps
 
 Singles = NDArray[np.float32]
@@ -69,30 +70,38 @@ def mark_points(
     width: int, poses: Floats, points: Floats, frame: Floats, seen: Bytes, wanted: Ints, counts: Ints
 ) -> None:
     """Numbers of the tiles in which points end, each once."""
-    for n in prange(len(poses)):
-        cosine, sine = math.cos(poses[n, 2]), math.sin(poses[n, 2])
-        count = 0
-        for m in range(len(points)):
-            x, y = _cell(poses[n], cosine, sine, points[m, 0], points[m, 1], frame)
-            place = (y >> SHIFT) * width + (x >> SHIFT)
-            if seen[n, place] == 0:
-                seen[n, place] = 1
-                wanted[n, count] = place
-                count += 1
-        counts[n] = count
+    line = queue(len(poses))
+    for begin in prange(len(poses)):
+        n = take(line, begin)
+        while n < len(poses):
+            cosine, sine = math.cos(poses[n, 2]), math.sin(poses[n, 2])
+            count = 0
+            for m in range(len(points)):
+                x, y = _cell(poses[n], cosine, sine, points[m, 0], points[m, 1], frame)
+                place = (y >> SHIFT) * width + (x >> SHIFT)
+                if seen[n, place] == 0:
+                    seen[n, place] = 1
+                    wanted[n, count] = place
+                    count += 1
+            counts[n] = count
+            n = take(line, n)
 
 
 @njit(cache=True, parallel=True)
 def _write_points(
     directory: Ints, cells: Singles, poses: Floats, points: Floats, light: Floats, precision: Floats, frame: Floats
 ) -> None:
-    for n in prange(len(poses)):
-        cosine, sine = math.cos(poses[n, 2]), math.sin(poses[n, 2])
-        for m in range(len(points)):
-            x, y = _cell(poses[n], cosine, sine, points[m, 0], points[m, 1], frame)
-            tile, place = directory[n, y >> SHIFT, x >> SHIFT], ((y & MASK) << SHIFT) | (x & MASK)
-            cells[tile, place] += precision[m]
-            cells[tile, _PLANE + place] += precision[m] * light[m]
+    line = queue(len(poses))
+    for begin in prange(len(poses)):
+        n = take(line, begin)
+        while n < len(poses):
+            cosine, sine = math.cos(poses[n, 2]), math.sin(poses[n, 2])
+            for m in range(len(points)):
+                x, y = _cell(poses[n], cosine, sine, points[m, 0], points[m, 1], frame)
+                tile, place = directory[n, y >> SHIFT, x >> SHIFT], ((y & MASK) << SHIFT) | (x & MASK)
+                cells[tile, place] += precision[m]
+                cells[tile, _PLANE + place] += precision[m] * light[m]
+            n = take(line, n)
 
 
 @njit(cache=True)

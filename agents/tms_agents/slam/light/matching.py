@@ -17,6 +17,7 @@ from tms_agents.slam.geometry import Bytes, Floats, Ints, wrap
 from tms_agents.slam.light.layer import Singles, light_at
 from tms_agents.slam.matching import COST, TOTAL, linearise, solve
 from tms_agents.slam.occupancy import UNKNOWN
+from tms_agents.slam.sharing import queue, take
 from tms_agents.slam.tiles import MASK, SHIFT
 
 _ITERATIONS = 20
@@ -61,21 +62,25 @@ def match_light_all(
 
     ``beams`` (M, 6) is x, y, the tangent's x, y, light and deviation of the beams with light.
     """
-    for n in prange(len(poses)):
-        prior, sure = priors[n].copy(), precision[n].copy()
-        off = poses[n] - prior
-        off[2] = wrap(off[2])
-        if off @ sure @ off > _SLIPPED:
-            prior, sure = poses[n].copy(), sure / _SLIPPED
-        known = _ending_in_the_known(
-            directory[n], squared, metres, frame, points, occupancy_directory[n], occupancy, poses[n]
-        )
-        match_light(
-            directory[n], squared, metres, frame, known, light_directory[n], light_cells, light_frame, beams, prior,
-            sure, sigma, temperature, light_temperature, poses[n], hessians[n], results[n],
-        )  # fmt: skip
-        usual = results[n, COST] / max(1, len(known))
-        results[n, TOTAL] += usual * (len(points) - len(known))
+    line = queue(len(poses))
+    for begin in prange(len(poses)):
+        n = take(line, begin)
+        while n < len(poses):
+            prior, sure = priors[n].copy(), precision[n].copy()
+            off = poses[n] - prior
+            off[2] = wrap(off[2])
+            if off @ sure @ off > _SLIPPED:
+                prior, sure = poses[n].copy(), sure / _SLIPPED
+            known = _ending_in_the_known(
+                directory[n], squared, metres, frame, points, occupancy_directory[n], occupancy, poses[n]
+            )
+            match_light(
+                directory[n], squared, metres, frame, known, light_directory[n], light_cells, light_frame, beams, prior,
+                sure, sigma, temperature, light_temperature, poses[n], hessians[n], results[n],
+            )  # fmt: skip
+            usual = results[n, COST] / max(1, len(known))
+            results[n, TOTAL] += usual * (len(points) - len(known))
+            n = take(line, n)
 
 
 @njit(cache=True)
