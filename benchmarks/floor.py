@@ -24,8 +24,9 @@ from typing import Any, Literal
 
 import numpy as np
 from floor_contestants import CONTESTANTS, Contestant
+from floor_memory import memory
 from floor_scores import Scores, score
-from floor_speed import memory, speed
+from floor_speed import speed
 from floor_tables import movers_table, objects_table, requirements_table, static_table
 
 from tms_agents.devices.scans import Sweep
@@ -34,8 +35,14 @@ from tms_agents.simulation.floor_world import UNSEEN, FloorWorld
 Feet = Literal["legs", "prints"]
 
 TUNING_SEEDS = range(1, 6)
-MOVER_SCENES = ("one", "three", "three close", "eight", "start", "bed", "robots", "two lasers", "mirror", "misplaced")
-OBJECT_SCENES = ("things", "near wall", "glossy", "hidden", "furniture", "robots", "two lasers", "mirror", "misplaced")
+MOVER_SCENES = (
+    *("one", "three", "three close", "eight", "start", "bed", "standing"),
+    *("robots", "two lasers", "mirror", "misplaced"),
+)
+OBJECT_SCENES = (
+    *("things", "near wall", "glossy", "hidden", "standing", "furniture"),
+    *("robots", "two lasers", "mirror", "misplaced"),
+)
 SCENES = tuple(dict.fromkeys(MOVER_SCENES + OBJECT_SCENES))
 FEET: tuple[Feet, ...] = ("legs", "prints")
 SAMPLES = Path(os.environ.get("TMS_SHARED_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

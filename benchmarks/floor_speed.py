@@ -1,4 +1,4 @@
-"""What floor sensing costs: CPU per scan of the whole estimator, beside Stone Soup's tracker alone; memory over a day.
+"""What floor sensing costs: CPU per scan of the whole estimator, beside Stone Soup's tracker alone.
 
 Stone Soup is no dependency of ours: `pip install stonesoup` into the environment makes its rows appear.
 """
@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -138,39 +137,6 @@ def _cpu_ms(work: Callable[[Any], None], batch: Sequence[Any]) -> float:
     return (time.process_time_ns() - begin) / 1e6 / len(batch)
 
 
-def memory(hours: float, seed: int = 1000) -> None:
-    """Some minutes of people and things, again and again for a day: does the estimator grow?"""
-    world = FloorWorld("things", seed)
-    frames = list(world.scans())
-    contestant = _contestant("ours", world)
-    lap_s = frames[-1].t + 0.1
-    resident = [resident_mb()]
-    begin = time.process_time()
-    laps = max(2, round(3600 * hours / lap_s))
-    marks = {max(1, round(laps * share)) for share in (0.05, 0.25, 0.5, 0.75, 1.0)}
-    print(
-        f"### Memory of the estimator over {hours:g} simulated hours ({laps} times {lap_s:.0f} s, 8 things, 2 people)\n"
-    )
-    print("| simulated hours | resident MB |\n|---|---|")
-    for lap in range(laps):
-        _play(contestant, frames, lap * lap_s)
-        if lap + 1 in marks:
-            resident.append(resident_mb())
-            print(f"| {(lap + 1) * lap_s / 3600:.2f} | {resident[-1]:.1f} |", flush=True)
-    spent = time.process_time() - begin
-    growth = resident[-1] - resident[1]
-    print(
-        f"\nGrowth after the first twentieth: {growth:.2f} MB; {spent:.0f} s CPU for {laps * len(frames)} scans\n",
-        flush=True,
-    )
-
-
-def _play(contestant: Contestant, frames: Sequence[Frame], shift_s: float = 0.0) -> None:
+def _play(contestant: Contestant, frames: Sequence[Frame]) -> None:
     for frame in frames:
-        contestant.scan(frame.sensor, frame.t + shift_s, frame.ranges, frame.intensities)
-
-
-def resident_mb() -> float:
-    """Of this process."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * 4096 / 1e6
+        contestant.scan(frame.sensor, frame.t, frame.ranges, frame.intensities)

@@ -123,7 +123,8 @@ def _asked(value: str, scores: Sequence[Scores]) -> str:
     if value == "removal_s":
         values = objects.values(value)
         return f"{_quantiles(values, 1)}; {100 * np.mean(values <= 1):.0f} % in time" if len(values) else ""
-    return f"{_quantiles(1e3 * objects.values('error_m'), 0)} mm"
+    errors = 1e3 * objects.values("error_m")
+    return f"{_quantiles(errors, 0)} mm, RMSE {number(float(np.sqrt(np.mean(errors**2))), 0)} mm" if len(errors) else ""
 
 
 def static_table(rows: Mapping[tuple[str, int], tuple[int, int]], seconds: float) -> str:

@@ -99,7 +99,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
     body.lone_x, body.lone_y = c.x, c.y
     body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
-    body.shoe = 0.0
+    body.shoe, body.leg, body.odd = 0.0, 0.0, 0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure = 0.0, 0, 1.0
@@ -166,7 +166,9 @@ def update(
     body.seen = t
     body.clear = 0.0
     best = max(footlike(c) if has_c else 0.0, footlike(d) if has_d else 0.0)
-    body.quality += 0.05 * (best - body.quality)
+    if (has_c and c.cut != 2) or (has_d and d.cut != 2):
+        # What is left of a foot behind somebody else tells nothing.
+        body.quality += 0.05 * (best - body.quality)
     both = has_c and has_d
     vx, vy, slow = 0.0, 0.0, np.inf
     if one and has_c and not has_d:
@@ -188,7 +190,8 @@ def update(
             body.robot = 1
         elif body.wide < 0.15:
             body.robot = 0
-    body.width += 0.1 * (width - body.width)
+    if not one:
+        body.width += 0.1 * (width - body.width)
     body.far = max(body.far, width) if body.hits > 3 else width
     _measure(body, x - body.x, y - body.y, 1.0, 0.0, noise)
     if slow < np.inf:

@@ -22,6 +22,7 @@ from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
+from tms_agents.floor.strays import release
 from tms_agents.floor.tracks import Tracks
 from tms_agents.floor.view import View
 
@@ -32,8 +33,8 @@ _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
 #: In a door somebody may wait for so long (s).
 _WAITS_S = 25.0
-#: Of saved states; 3: where feet were alone and bodies rested.
-_FORMAT = 3
+#: Of saved states; 4: how wide legs are, and since when prints have been nobody's.
+_FORMAT = 4
 
 
 class FloorEstimator:
@@ -128,7 +129,9 @@ class FloorEstimator:
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks, prints, t, view.sight)
         if recognize(bodies, *self._robots):
             self._association.decide()
-        attend(prints, bodies, t)
+        attend(prints, bodies, t, dt)
+        if release(bodies, prints, t):
+            self._association.decide()
         count_feet(prints, bodies, t, dt)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
             for other in self._views.values():

@@ -16,6 +16,8 @@ from numba import njit
 _SWING_M, _STANCE_M = 0.05, 0.12
 #: A shoe seems to move so far (m) when it rolls off. Of such a share of wide feet somebody's shoes are seen, not legs.
 _ROLL_M, SHOES, _SHOE_M = 0.17, 0.3, (0.16, 0.34)
+#: Legs are measured while somebody walks faster than this (m/s): nothing else does.
+_WALKS = 0.4
 #: A foot stands and swings for so long (s) while somebody walks.
 _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 #: So many stances tell somebody's beat of late, and his own.
@@ -91,9 +93,11 @@ def beat(body: Any, stood: float, swung: float) -> None:
 
 @njit(cache=True)
 def shod(body: Any, c: Any) -> None:
-    """Learn from a foot whether shoes are seen, flat on the floor, or legs."""
+    """Learn from a foot whether shoes are seen, flat on the floor, or legs, and how wide these are."""
     if c.cut == 0:
         body.shoe += 0.04 * ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - body.shoe)
+        if np.hypot(body.vx, body.vy) > _WALKS:
+            body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
 
 
 @njit(cache=True)

@@ -76,6 +76,15 @@ def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float,
 
 
 @njit(cache=True)
+def waits(body: Any, c: Any) -> bool:
+    """Whether the cluster is where a foot of the body stood when it was lost sight of."""
+    if not body.stale or body.robot or max(body.a_seen, body.b_seen) < 0.0:
+        return False
+    a = body.a_seen >= 0.0 and np.hypot(c.x - body.ax, c.y - body.ay) < STAND_M
+    return bool(a or (body.b_seen >= 0.0 and np.hypot(c.x - body.bx, c.y - body.by) < STAND_M))
+
+
+@njit(cache=True)
 def costs(
     clusters: Any,
     of: NDArray[np.int64],
@@ -105,7 +114,7 @@ def costs(
             stands = False
             for column in range(k):
                 body = bodies[rows[column]]
-                stands = stands or body.a_print == of[i] or body.b_print == of[i]
+                stands = stands or body.a_print == of[i] or body.b_print == of[i] or waits(body, c)
                 part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
                 stands = stands or part
             if not stands:
@@ -115,7 +124,7 @@ def costs(
         for column in range(k):
             body = bodies[rows[column]]
             away = np.hypot(c.x - body.x, c.y - body.y)
-            if body.stale and age > _FRESH_S:
+            if body.stale and age > _FRESH_S and not waits(body, c):
                 continue
             if not body.confirmed and age > t - body.first + 0.25:
                 continue
@@ -160,7 +169,7 @@ def costs(
                 value = UNLIKELY
                 if standing >= 0 and standing == of[i]:
                     value = base + min(0.5 * off / STAND_M**2, 2.0) + (_LEFT if left else 0.0)
-                elif gap < 1.0:
+                elif gap < 1.0 or body.stale:
                     value = base + 0.5 * off / STAND_M**2
                 if body.shoe >= SHOES:
                     if gap < 0.35:

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.freespace import FREE, clear, silent
+from tms_agents.floor.gait import SHOES
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ _MUTE_S = 3.0
 _STILL_M, _STILL = 0.008, 0.001
 #: Somebody is at a print when the body or a foot is so near (m).
 NEAR_M = 0.36
+#: Seen so often, a shoe is not so thin (m), a leg not so much thinner or wider than it was.
+_OFTEN, _SHOE_M, _LEG = 10, 0.07, (0.65, 1.6)
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
 
@@ -104,20 +107,20 @@ def follow(
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
             q.attached = c.attached
-            q.owner, q.owned, q.busy, q.revealed, q.given = -1, -1e9, -1e9, 0, 0
+            q.owner, q.owned, q.busy, q.revealed, q.given, q.idle = -1, -1e9, -1e9, 0, 0, 0.0
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
             q.first, q.rested = t, t
             q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n
-            q.revealed = 0
+            q.revealed, q.idle = 0, 0.0
         if t - max(q.last, q.silent) > _GONE_S and _same(q, c):
             # Somebody may stand there now, but if it is nobody's foot it has been there all the time.
             if q.width < _WIDE_M:
                 q.first = t
         elif t - max(q.last, q.silent) > _GONE_S:
-            q.first, q.rested = t, t
+            q.first, q.rested, q.idle = t, t, 0.0
             q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
         q.hits += 1
         q.looks += 1
@@ -160,17 +163,27 @@ def follow(
 
 
 @njit(cache=True)
-def attend(prints: Any, bodies: Any, t: float) -> None:
+def unlike_foot(body: Any, q: Any) -> bool:
+    """Whether the print, seen whole, is too thin for a shoe, or as wide as no leg of the body."""
+    if q.hits < _OFTEN or q.whole < 0.5 * q.hits:
+        return False
+    if body.shoe >= SHOES:
+        return bool(q.width < _SHOE_M)
+    return bool(body.leg > 0.0 and not _LEG[0] < q.width / body.leg < _LEG[1])
+
+
+@njit(cache=True)
+def attend(prints: Any, bodies: Any, t: float, dt: float) -> None:
     """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy)."""
     for b in range(bodies.size):
         body = bodies[b]
         body.still = 0.0
         if body.used and body.a_print >= 0 and body.b_print >= 0 and max(t - body.a_seen, t - body.b_seen) < 0.5:
             body.still = t - max(prints[body.a_print].still, prints[body.b_print].still)
-        body.older = 0.0
-        j, land = (body.a_print, body.a_land) if body.a_seen >= body.b_seen else (body.b_print, body.b_land)
+        body.older, body.odd = 0.0, 0
+        j = body.a_print if body.a_seen >= body.b_seen else body.b_print
         if body.used and j >= 0:
-            body.older = land - prints[j].rested
+            body.older, body.odd = prints[j].idle, unlike_foot(body, prints[j])
     for j in range(prints.size):
         q = prints[j]
         if not q.used:
@@ -181,10 +194,13 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
                     bodies[b].b_print = -1
             continue
         q.owner = -1
+        nobodys = q.last == t
         for b in range(bodies.size):
             body = bodies[b]
             if not body.used:
                 continue
+            if body.a_print == j or body.b_print == j:
+                nobodys = False
             if body.stale and q.last == t and t - q.first > _NOT_HIS_S:
                 # What has been seen there for a while is no foot of one who is not seen.
                 body.a_print = -1 if body.a_print == j else body.a_print
@@ -209,3 +225,5 @@ def attend(prints: Any, bodies: Any, t: float) -> None:
                 d = min(d, np.hypot(body.bx - q.x, body.by - q.y))
             if d < reach:
                 q.busy = t
+        if nobodys:
+            q.idle += dt

@@ -18,12 +18,14 @@ Array = NDArray[np.float64]
 NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
-#: Where the other foot was last seen, within this (m), and it may be hidden, time counts by this share.
-_BEHIND, _STEP_M = 0.2, 0.1
+#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer.
+_STEP_M = 0.1
 #: What had stood there for so long (s) before somebody's only foot came there is most likely a thing: time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
-#: Nobody stands for so long (s) without shifting a foot.
-_STILL_S = 40.0
+#: Not even who has come step by step stands for so long (s) without shifting a foot.
+_STILL_S = 900.0
+#: Whose other foot was last seen so near (m) stands on both.
+_STANCE_M = 0.4
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
@@ -37,8 +39,8 @@ _REST_M = 0.15
 _QUALITY = 0.3
 #: Who was seen so often is somebody.
 _KNOWN = 200
-#: Nobody stands with the feet so far apart (m) for long.
-_ASTRIDE_M = 0.48
+#: Who has taken so many steps, two feet of whom were seen so often, is a person.
+_STEPS, _BOTH = 3, 30
 #: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
 _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
 #: A mover is told again when it has moved so far (m).
@@ -47,17 +49,25 @@ _TELL_M = 0.05
 
 @njit(cache=True)
 def _is_lone(body: Any, t: float) -> bool:
-    """Whether of a person only one thing is seen, or two too far apart to stand on, unmoved for some time."""
+    """Whether all that is seen of a person, unmoved for some time, may be a thing or two."""
     if body.robot or body.wide > 0.6 or body.width > 0.2:
         return False
-    a, b = t - body.a_seen, t - body.b_seen
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)
+    if _has_walked(body) and body.older < _OLDER_S and not body.odd and apart < _STANCE_M:
+        # One leg hides the other for as long as he likes.
+        return bool(body.still > _STILL_S)
+    a, b = t - body.a_seen, t - body.b_seen
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
-    astride = max(a, b) < 0.5 and apart > _ASTRIDE_M and t - max(body.a_since, body.b_since) > 1.5
-    if body.still > _STILL_S or sliver or astride:
+    if body.still > _STILL_S or sliver:
         return True
     since = body.a_since if a < b else body.b_since
     return bool(max(a, b) > 1.0 and t - since > 1.0)
+
+
+@njit(cache=True)
+def _has_walked(body: Any) -> bool:
+    """Whether it has come on two feet, step by step."""
+    return bool(body.own_pace_n >= _STEPS and body.both >= _BOTH)
 
 
 @njit(cache=True)
@@ -86,7 +96,7 @@ def _is_known(body: Any) -> bool:
 @njit(cache=True)
 def is_footless(body: Any) -> bool:
     """Whether it has been broader than two feet side by side, and two feet were hardly ever seen."""
-    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits)
+    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits and not _has_walked(body))
 
 
 @njit(cache=True)
@@ -175,8 +185,8 @@ def review(
                     body.lone_x, body.lone_y = foot_x, foot_y
                 if body.older > _OLDER_S:
                     body.lone += dt * _FASTER
-                else:
-                    body.lone += dt * (_BEHIND if behind else 1.0)
+                elif not behind:
+                    body.lone += dt
             elif (
                 max(t - body.a_seen, t - body.b_seen) < 1.0
                 or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
@@ -190,7 +200,7 @@ def review(
                 actions[b] = LOST
             elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
                 # Somebody who is known for long has gone on from there.
-                actions[b] = LOST if _is_known(body) else GONE
+                actions[b] = LOST if _is_known(body) or _has_walked(body) else GONE
             elif body.stale:
                 actions[b] = BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:

@@ -12,7 +12,8 @@ import numpy as np
 #: not, last time seen, hits, looks and mutes (scans since that hit it, that could have, that saw nothing at all there;
 #: of those that hit it, that saw all of it, and only what something new before it left), width m, spread m (mean
 #: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), busy (when a body was last near),
-#: spare (s for which somebody beside it has shown two other feet), revealed (`furniture.LOOKS`, `furniture.MOVED`),
+#: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
+#: revealed (`furniture.LOOKS`, `furniture.MOVED`),
 #: beams of the last sighting.
 PRINT = np.dtype(
     [
@@ -39,6 +40,7 @@ PRINT = np.dtype(
         ("revealed", "i8"),
         ("given", "i8"),
         ("spare", "f8"),
+        ("idle", "f8"),
         ("silent", "f8"),
         ("still_x", "f8"),
         ("still_y", "f8"),
@@ -53,8 +55,9 @@ PRINT = np.dtype(
 #: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
 #: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
 #: who it is (look, pace), and of the one whose name it has (own, own_pace); sure is how likely that name is. Further:
-#: for how long (s) and where it has stood on one foot alone (lone), for how long what it stands on had been there
-#: before (older, s), where and since when it has stayed (rest).
+#: for how long (s) and where it has stood on one foot alone (lone), for how long what it stands on had been nobody's
+#: before (older, s), where and since when it has stayed (rest), how wide the
+#: legs are (m, 0: unknown), whether what is seen of it is as wide as no foot (odd).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -129,6 +132,8 @@ BODY = np.dtype(
         ("a_late", "f8"),
         ("b_late", "f8"),
         ("shoe", "f8"),
+        ("leg", "f8"),
+        ("odd", "i8"),
         ("shine", "f8"),
         ("shine_n", "i8"),
         ("own", "f8"),

@@ -26,10 +26,14 @@ _NEW_S = 30.0
 _PUSHED_M = 2.0
 #: What has moved with people beside it for less than this share of the way has moved by itself.
 _ALONE = 0.3
-#: Two of them so near each other (m) are one.
-_UNITE_M = 0.45
+#: Two of them so near each other (m) are one, if the younger has shown two feet in less than this share of the scans.
+_UNITE_M, _BOTH = 0.45, 0.25
 #: A seated person's feet vanish so near the seat (m), and those of somebody who goes where nobody is looked for.
-_SEAT_M, _MASK_M = 0.45, 0.3
+_SEAT_M, _MASK_M = 0.45, 0.5
+#: A foot is where it was seen so long (s) before the last one.
+_FOOT_S = 1.5
+#: Who has stayed where he is for so long (s) when he is hidden stands on, also in a door.
+_RESTS_S = 2.0
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
 
@@ -145,6 +149,7 @@ class Tracks:
             for other in lone.tolist():
                 one, two = bodies[other], bodies[index]
                 near = math.hypot(one["x"] - two["x"], one["y"] - two["y"]) < _UNITE_M
+                near = near and two["both"] < _BOTH * two["hits"]
                 if near and one["used"] and two["used"] and one["label"] < two["label"]:
                     self._association.decide()
                     self._association.forget(index)
@@ -156,7 +161,11 @@ class Tracks:
         body = self.bodies[index]
         if body["stale"]:
             return []
-        if self._outside(body):
+        if self._seated(body):
+            # Who has sat down has not gone on the way he went.
+            foot = "a" if body["a_seen"] > body["b_seen"] else "b"
+            body["x"], body["y"] = body[f"{foot}x"], body[f"{foot}y"]
+        elif self._outside(body) and body["seen"] - body["rest_at"] < _RESTS_S:
             self._association.forget(index)
             return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
         if body["seen"] == t:
@@ -171,10 +180,16 @@ class Tracks:
         return [Stale(t, int(body["label"]))]
 
     def _seated(self, body: Any) -> bool:
-        return self._seats.distance(body["ax"], body["ay"]) < _SEAT_M
+        return self._nearest(self._seats, body) < _SEAT_M
 
     def _masked(self, body: Any) -> bool:
-        return self._masks.distance(body["x"], body["y"]) < _MASK_M
+        return min(self._nearest(self._masks, body), self._masks.distance(body["x"], body["y"])) < _MASK_M
+
+    @staticmethod
+    def _nearest(area: Area, body: Any) -> float:
+        """How far (m) from the area a foot was seen at last."""
+        feet = [foot for foot in "ab" if body["seen"] - body[f"{foot}_seen"] < _FOOT_S]
+        return min((area.distance(body[f"{foot}x"], body[f"{foot}y"]) for foot in feet), default=math.inf)
 
     def _outside(self, body: Any) -> bool:
         x, y = float(body["x"]), float(body["y"])

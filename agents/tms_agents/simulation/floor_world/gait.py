@@ -88,6 +88,8 @@ class Walker:
         self.xy, self.yaw = xy, yaw
         self.build = build or Build.draw(rng)
         self.lifted = False  # both feet off the floor: sitting on a bed
+        self.shifts_s = (3.0, 12.0)  # between two shifts of the weight
+        self.lean = 0.0  # share of the sway of the body that ankles go along
         self._rng = rng
         self._velocity = (0.0, 0.0)
         self._t = t
@@ -136,10 +138,11 @@ class Walker:
         if self.lifted:
             return
         b = self.build
+        leans = self._leans()
         for foot in self._feet:
             (x, y), velocity = foot.position(t)
             if kind == "legs":
-                drawing.circle((x, y), b.ankle, owner, b.material, velocity)
+                drawing.circle((x + leans[0], y + leans[1]), b.ankle, owner, b.material, velocity)
                 continue
             if foot.target is not None and t > foot.start_s:
                 continue
@@ -154,6 +157,14 @@ class Walker:
                 drawing.circle(ball, b.ball, owner, b.material)
             else:
                 drawing.capsule(heel, b.heel, ball, b.ball, owner, b.material, (0.0, 0.0))
+
+    def _leans(self) -> Xy:
+        """How far ankles go along with the body above two feet that stand."""
+        one, two = self._feet
+        if self.lean == 0.0 or one.target is not None or two.target is not None:
+            return (0.0, 0.0)
+        off = (self.xy[0] - (one.xy[0] + two.xy[0]) / 2, self.xy[1] - (one.xy[1] + two.xy[1]) / 2)
+        return (self.lean * off[0], self.lean * off[1])
 
     def _maybe_step(self, t: float, speed: float) -> None:
         b = self.build
@@ -175,7 +186,7 @@ class Walker:
                 self._next_step_s = foot.end_s + 0.1
                 return
         if t >= self._shift_s:
-            self._shift_s = t + self._rng.uniform(3, 12)
+            self._shift_s = t + self._rng.uniform(*self.shifts_s)
             foot = self._feet[self._rng.integers(2)]
             near = (self.xy[0] + self._rng.normal(0, 0.025), self.xy[1] + self._rng.normal(0, 0.025))
             self._swing(foot, t, near, self.yaw + self._rng.normal(0, 0.15), 0.3)

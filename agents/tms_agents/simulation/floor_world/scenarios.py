@@ -11,6 +11,7 @@ from tms_agents.simulation.floor_world.life import Life
 from tms_agents.simulation.floor_world.movers import Mover
 from tms_agents.simulation.floor_world.room import Thing
 from tms_agents.simulation.floor_world.shapes import BLACK, Material, Pose, Xy
+from tms_agents.simulation.floor_world.standing import standing
 from tms_agents.simulation.floor_world.stories import cross, leave, new_thing, pick, push, put, sit, wander
 from tms_agents.simulation.floor_world.tasks import Drag, Face, Go, Story, Wait
 
@@ -327,6 +328,10 @@ SCENARIOS: dict[str, Scenario] = {
     "hidden": Scenario(description="things hidden for more than a minute", duration=300, write=_hidden),
     "start": Scenario(description="people are there before the sensor", duration=100, write=_start, quiet_s=0.0),
     "bed": Scenario(description="people sit on the bed", duration=170, write=_bed),
+    "standing": Scenario(
+        description="people stand for minutes, things beside them", duration=420,
+        write=lambda life, duration: standing(life, duration, QUIET_S),
+    ),
     "furniture": Scenario(description="furniture is moved, a door swings", duration=200, write=_furniture),
     "robots": Scenario(description="robots among people", duration=170, write=_robots),
     "two lasers": Scenario(

@@ -1,0 +1,63 @@
+"""A thing put down beside somebody who stands may be taken for his other foot while one leg hides the other: until it
+turns out to be as wide as no foot of his, or too far off to stand on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from tms_agents.floor.gait import SHOES
+from tms_agents.floor.prints import unlike_foot
+
+#: Nobody stands with the shoes or the legs so far apart (m) for so long (s).
+_SHOES_M, _LEGS_M, _ASTRIDE_S = 0.48, 0.4, 5.5
+#: So far (m) from the other a foot is seen whole; it has stood for so long (s).
+_APART_M, _STOOD_S = 0.25, 2.0
+#: What has been nobody's for so long (s) is no foot rather than what came last.
+_IDLE_S = 1.0
+
+
+@njit(cache=True)
+def _stray(body: Any, prints: Any, t: float) -> int:
+    """Which foot is none: 1 the first, 2 the second, 0: both may be feet."""
+    a, b = body.a_print, body.b_print
+    if a < 0 or b < 0 or a == b or max(t - body.a_seen, t - body.b_seen) > 0.5:
+        return 0
+    p, q = prints[a], prints[b]
+    stood = t - max(p.first, q.first)
+    shod, apart = body.shoe >= SHOES, np.hypot(body.ax - body.bx, body.ay - body.by)
+    if stood > _STOOD_S and apart > _APART_M:
+        first, second = unlike_foot(body, p), unlike_foot(body, q)
+        if first != second:
+            return 1 if first else 2
+    if stood < _ASTRIDE_S or apart < (_SHOES_M if shod else _LEGS_M):
+        return 0
+    if max(p.idle, q.idle) > _IDLE_S:
+        return 1 if p.idle > q.idle else 2
+    return 1 if body.a_land > body.b_land else 2
+
+
+@njit(cache=True)
+def release(bodies: Any, prints: Any, t: float) -> int:
+    """Take from those of ``bodies`` (n,) that stand on a thing, one of ``prints``, this foot; how many there are."""
+    count = 0
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not body.used or not body.confirmed or body.robot or body.stale or body.wide > 0.6:
+            continue
+        stray = _stray(body, prints, t)
+        if stray == 0:
+            continue
+        count += 1
+        if stray == 1:
+            prints[body.a_print].given = 1
+            body.a_print, body.a_seen = -1, body.b_land
+            body.ax, body.ay = body.bx, body.by
+        else:
+            prints[body.b_print].given = 1
+            body.b_print, body.b_seen = -1, body.a_land
+            body.bx, body.by = body.ax, body.ay
+        body.x, body.y = body.ax, body.ay
+    return count
