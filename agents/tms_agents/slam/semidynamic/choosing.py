@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tms_agents.slam.geometry import Floats, transform, wrapped
@@ -43,6 +44,8 @@ class Track:
     total: float = 0.0
     #: By the array of poses, the other tag and its pose: what they share.
     overlaps: dict[tuple[int, str, bytes], Floats] = field(default_factory=dict)
+    #: By family and visit: which poses are those of the visit before.
+    same: dict[tuple[int, int], NDArray[np.bool_]] = field(default_factory=dict)
 
     def outline(self, pose: Floats) -> Floats:
         return transform(pose, self.shape.outline)
@@ -146,7 +149,7 @@ def _viterbi(
     without: frozenset[str] = frozenset(),
 ) -> tuple[Floats, float]:
     best, found = -np.inf, np.empty((0, 3))
-    for family in track.families:
+    for which, family in enumerate(track.families):
         costs = []
         for number, (poses, scores) in enumerate(zip(family.poses, family.scores, strict=True)):
             score = scores - _shared(track, number, poses, tracks, at_once, without)
@@ -157,7 +160,7 @@ def _viterbi(
             continue
         total, back = costs[0], []
         for number in range(1, len(costs)):
-            step = total[:, None] + _stays(track, number, family)
+            step = total[:, None] + _stays(track, number, which)
             back.append(np.argmax(step, axis=0))
             total = step.max(axis=0) + costs[number]
         last = int(np.argmax(total))
@@ -170,13 +173,15 @@ def _viterbi(
     return found, best
 
 
-def _stays(track: Track, number: int, family: Family) -> Floats:
+def _stays(track: Track, number: int, which: int) -> Floats:
     """(C, D) what it is worth that the pose before visit ``number`` is the pose in it."""
-    before, after = family.poses[number - 1], family.poses[number]
-    apart = after[None, :, :] - before[:, None, :]
-    same = (np.hypot(apart[..., 0], apart[..., 1]) < SAME_M) & (np.abs(wrapped(apart[..., 2])) < SAME_RAD)
+    if (which, number) not in track.same:
+        before, after = (track.families[which].poses[n] for n in (number - 1, number))
+        apart = after[None, :, :] - before[:, None, :]
+        near = np.hypot(apart[..., 0], apart[..., 1]) < SAME_M
+        track.same[which, number] = near & (np.abs(wrapped(apart[..., 2])) < SAME_RAD)
     bonus = _SAME_PASS if track.visits[number].leg == track.visits[number - 1].leg else _SAME_PLACE
-    found: Floats = bonus * same
+    found: Floats = np.where(track.same[which, number], bonus, 0.0)
     return found
 
 
