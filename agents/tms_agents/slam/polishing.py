@@ -31,7 +31,7 @@ _REACHES_M = (0.25, 0.12, 0.08)
 #: Before them where things that were moved pulled the path along, which may be by half a metre and more.
 _WIDELY_M = (0.9, 0.5)
 #: One scan slides along another where it is so much less held than across.
-_SLIDES = 0.06
+_SLIDES = 0.2
 #: A path is torn where from one scan to the next it is so far off odometry (m).
 _TORN_M = 0.05
 #: A match counts if so large a share of the points that should fit does.

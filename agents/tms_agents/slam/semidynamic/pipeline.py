@@ -23,10 +23,10 @@ from tms_agents.slam.settings import Settings
 
 #: Cells of the map (m).
 RESOLUTION_M = 0.02
-#: Points so near to an object are of what may be moved (m); a path is pulled along where it is so far off (m).
-_MOVABLE_M, _PULLED_M = 0.2, 0.08
-#: So often at most.
-_TIMES = 3
+#: A path is pulled along where it is so far off (m).
+_PULLED_M = 0.08
+#: Round by round, points so near to an object are of what may be moved (m): at first it may be misplaced, too.
+_MOVABLE_M = (0.7, 0.3, 0.2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,21 +75,17 @@ def steadied(
         return solve(log, path, rounds, odometry_at(log.t, path, rounds.t), models, settings.seed)
 
     stays = objects(poses)
-    for _ in range(_TIMES):
-        again = _by_what_stays(log, poses, stays, models, settings)
+    for within in _MOVABLE_M:
+        again = _by_what_stays(log, poses, Outlines(log.t, stays, models), within, settings)
         if float(np.hypot(*(again - poses)[:, :2].T).max()) < _PULLED_M:
             break
         poses, stays = again, objects(again)
     return poses, stays
 
 
-def _by_what_stays(
-    log: Log, poses: Floats, stays: dict[str, list[Stay]], models: Models, settings: Settings
-) -> Floats:
-    outlines = Outlines(log.t, stays, models)
-
+def _by_what_stays(log: Log, poses: Floats, outlines: Outlines, within: float, settings: Settings) -> Floats:
     def movable(n: int, points: Floats) -> NDArray[np.bool_]:
-        return outlines.own(n, transform(poses[n], points), _MOVABLE_M)
+        return outlines.own(n, transform(poses[n], points), within)
 
     again = polish(log, poses, settings.noise, movable)
     return between(again[:1], again)
