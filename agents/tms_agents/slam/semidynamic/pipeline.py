@@ -12,7 +12,7 @@ from tms_agents.slam.geometry import Floats, between, transform
 from tms_agents.slam.gridmap import GridMap
 from tms_agents.slam.logs import Log, odometry_at
 from tms_agents.slam.mapping import Progress, build_map
-from tms_agents.slam.polishing import polish
+from tms_agents.slam.polishing import legs_of, polish
 from tms_agents.slam.semidynamic.drawing import draw
 from tms_agents.slam.semidynamic.models import Models
 from tms_agents.slam.semidynamic.outlines import Outlines
@@ -75,6 +75,9 @@ def steadied(
         return solve(log, path, rounds, odometry_at(log.t, path, rounds.t), models, settings.seed)
 
     stays = objects(poses)
+    if legs_of(log.t)[-1] == 0:
+        # Never parked: of what pulled the path along nothing is known to be of another time.
+        return poses, stays
     for within in _MOVABLE_M:
         again = _by_what_stays(log, poses, Outlines(log.t, stays, models), within, settings)
         if float(np.hypot(*(again - poses)[:, :2].T).max()) < _PULLED_M:
