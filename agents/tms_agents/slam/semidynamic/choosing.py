@@ -150,14 +150,17 @@ def _viterbi(
 ) -> tuple[Floats, float]:
     best, found = -np.inf, np.empty((0, 3))
     for which, family in enumerate(track.families):
+        rows: list[NDArray[np.bool_]] = []
+        if fixed is not None:
+            rows = [(poses == pose).all(axis=1) for poses, pose in zip(family.poses, fixed, strict=True)]
+            if not all(row.any() for row in rows):
+                continue
         costs = []
         for number, (poses, scores) in enumerate(zip(family.poses, family.scores, strict=True)):
             score = scores - _shared(track, number, poses, tracks, at_once, without)
-            if fixed is not None:
-                score = np.where((poses == fixed[number]).all(axis=1), score, -np.inf)
+            if rows:
+                score = np.where(rows[number], score, -np.inf)
             costs.append(score)
-        if fixed is not None and any(np.isneginf(score).all() for score in costs):
-            continue
         total, back = costs[0], []
         for number in range(1, len(costs)):
             step = total[:, None] + _stays(track, number, which)
