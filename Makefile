@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -19,7 +19,8 @@ help:
 	@echo "make bench-threads  laser mapping with one and with two threads, by the clock on the wall"
 	@echo "make bench-localise  localisation from anywhere in known maps (LOCALISE='--worlds intel')"
 	@echo "make bench-light    received light in mapping, on simulated places (LIGHT='--places corridor')"
-	@echo "make bench-semidynamic  moved doors and bins, our method beside the paper's (SEMIDYNAMIC='--worlds short')"
+	@echo "make bench-semidynamic  moved doors and bins: path, objects, map (SEMIDYNAMIC='--worlds long --drives 50:52')"
+	@echo "make bench-semidynamic-paper  our method beside the paper's (SEMIDYNAMIC='--worlds short')"
 	@echo "make faults    the long fault tests (30 kills and more)"
 	@echo "make peers     tests against programs of other people (installs tshark)"
 	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
@@ -71,6 +72,9 @@ bench-light: $(READY)
 
 bench-semidynamic: $(READY)
 	$(BIN)/python benchmarks/semidynamic.py $(SEMIDYNAMIC)
+
+bench-semidynamic-paper: $(READY)
+	$(BIN)/python benchmarks/semidynamic_paper.py $(SEMIDYNAMIC)
 
 faults: $(READY)
 	TMS_KILLS=30 $(BIN)/python -m pytest -q --timeout 1800 tests/faults

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from tms_agents.slam import Log
 from tms_agents.slam.geometry import Floats, compose
-from tms_agents.slam.semidynamic import Models, Rounds, Semidynamic
-from tms_agents.slam.semidynamic.visits import passes_of
+from tms_agents.slam.semidynamic import Models, Semidynamic
 
 _PIXELS_PER_M, _ARROW_M, _MARGIN_M = 50, 0.5, 0.4
 _RED, _BLACK = (210, 30, 30), (0, 0, 0)
-
-
-def first_pass(log: Log, poses: Floats, rounds: Rounds) -> tuple[Log, Floats, Rounds]:
-    """What there was until the robot was parked for the first time."""
-    kept = passes_of(log.t) == 0
-    until = int(np.searchsorted(rounds.t, log.t[kept][-1], side="right"))
-    cut = replace(
-        log, t=log.t[kept], odometry=log.odometry[kept], driven=log.driven[kept], ranges=log.ranges[kept]
-    )  # fmt: skip
-    return cut, poses[kept], Rounds(rounds.t[:until], rounds.antenna[:until], rounds.tags[:until])
 
 
 def panels(path: Path, models: Models, shown: Sequence[tuple[str, Semidynamic]]) -> None:

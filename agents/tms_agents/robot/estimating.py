@@ -13,9 +13,9 @@ from tms_agents.robot.door_states import DoorAngle, door_angle
 from tms_agents.slam.geometry import Floats, compose, transform
 from tms_agents.slam.logs import Log
 from tms_agents.slam.semidynamic import Models, Rounds, Semidynamic, Stay, map_with_objects
-from tms_agents.slam.semidynamic.drawing import draw, stay_at
+from tms_agents.slam.semidynamic.drawing import draw
+from tms_agents.slam.semidynamic.outlines import Outlines
 from tms_agents.slam.semidynamic.shapes import surface
-from tms_agents.slam.semidynamic.visits import passes_of
 from tms_agents.slam.settings import Settings
 
 #: Beams that end so near to an object (m) are no wall; of every so many scans they are looked at.
@@ -93,21 +93,9 @@ def _standing(task: Task, tag: str, last: Stay, wall: Floats) -> Standing:
 
 def walls(log: Log, found: Semidynamic, models: Models) -> Floats:
     """(M, 2) m where beams ended that met no object."""
-    legs = passes_of(log.t)
+    outlines = Outlines(log.t, found.stays, models)
     points = []
     for n in range(0, len(log), _EVERY):
         there = transform(found.poses[n], log.points(n))
-        for tag, stays in found.stays.items():
-            stay = stay_at(stays, n, legs)
-            if stay is None:
-                continue
-            outline = surface(models.objects[tag], stay.pose)
-            low, high = outline.min(axis=0) - _OWN_M, outline.max(axis=0) + _OWN_M
-            near = ((there > low) & (there < high)).all(axis=1)
-            if near.any():
-                apart = np.hypot(*(there[near][:, None] - outline[None]).transpose(2, 0, 1)).min(axis=1)
-                kept = np.ones(len(there), dtype=np.bool_)
-                kept[np.flatnonzero(near)[apart < _OWN_M]] = False
-                there = there[kept]
-        points.append(there)
+        points.append(there[~outlines.own(n, there, _OWN_M)])
     return np.concatenate(points) if points else np.zeros((0, 2))

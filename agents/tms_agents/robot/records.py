@@ -14,8 +14,8 @@ import numpy as np
 from tms_agents.slam.geometry import Floats, compose, wrapped
 from tms_agents.slam.logs import Log
 from tms_agents.slam.logs_recording import Scan, put_together
+from tms_agents.slam.polishing import PARKED_S
 from tms_agents.slam.semidynamic import Rounds
-from tms_agents.slam.semidynamic.visits import PARKED_S
 
 #: A robot that has moved less than this stands still (m, rad).
 _STILL_M, _STILL_RAD = 0.02, 0.02

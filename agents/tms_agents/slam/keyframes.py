@@ -36,6 +36,11 @@ def key_scans(log: Log, step_m: float, step_rad: float) -> Indices:
     steps = np.diff(log.driven, axis=0) / np.array([step_m, step_rad])
     if len(steps) and np.median(steps.max(axis=1)) >= 0.5:
         return np.arange(len(log))
+    return spaced(log, step_m, step_rad)
+
+
+def spaced(log: Log, step_m: float, step_rad: float) -> Indices:
+    """(K,) scans of which each is so far from the one before, in any log."""
     keys = [0]
     for n in range(1, len(log)):
         if ((log.driven[n] - log.driven[keys[-1]]) >= (step_m, step_rad)).any():

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.logs import Log
@@ -28,6 +29,11 @@ class Lines:
     laser: Floats
     first: float
     step: float
+
+    def without(self, beams: NDArray[np.bool_]) -> Lines:
+        """As if ``beams`` (B,) had not returned."""
+        points = np.where(beams[:, None], np.nan, self.points)
+        return Lines(points, np.where(beams[:, None], 0.0, self.normals), self.laser, self.first, self.step)
 
 
 def lines_of(log: Log, n: int) -> Lines:

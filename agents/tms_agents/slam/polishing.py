@@ -10,42 +10,74 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tms_agents.slam.geometry import Floats, between, compose
-from tms_agents.slam.keyframes import Indices, key_scans, poses_of_all
+from tms_agents.slam.keyframes import Indices, poses_of_all, spaced
 from tms_agents.slam.lines import Lines, lines_of, match_lines
 from tms_agents.slam.logs import Log
 from tms_agents.slam.motion import OdometryNoise
-from tms_agents.slam.posegraph import Edges, optimise
+from tms_agents.slam.posegraph import Edges, joined, optimise
 
 #: Scans that are matched: one every so much (m, rad).
-_STEP_M, _STEP_RAD = 0.15, 0.12
+_STEP_M, _STEP_RAD = 0.1, 0.08
 #: Each with those so many before it, and with at most so many of other times whose views have their middles, so far
 #: ahead of the robot, near each other (m).
 _BEFORE, _OTHERS = (1, 2, 4), 4
 _AHEAD_M, _NEAR_M, _LONG_AGO = 2.0, 1.2, 12
 #: Steps of the reader of distances: how far lines are looked for (m), round by round.
 _REACHES_M = (0.25, 0.12, 0.08)
+#: Before them where things that were moved pulled the path along, which may be by half a metre and more.
+_WIDELY_M = (0.9, 0.5)
+#: One scan slides along another where it is so much less held than across.
+_SLIDES = 0.2
+#: A path is torn where from one scan to the next it is so far off odometry (m).
+_TORN_M = 0.05
 #: A match counts if so large a share of the points that should fit does.
 _SHARE = 0.5
 #: Errors of beams, m, of which so many are worth one witness; a match is never better than this (m, rad).
 _SIGMA_M, _WITNESSES, _FLOOR = 0.02, 6.0, (0.002, 0.002, 0.0008)
 _SWITCH = 12.0
+#: The robot was parked where records are so far apart (s).
+PARKED_S = 600.0
 
 
-def polish(log: Log, poses: Floats, noise: OdometryNoise, progress: Callable[[float], None] = lambda _: None) -> Floats:
-    """(S, 3) of every scan, from ``poses`` (S, 3) that are right within a decimetre or two."""
-    keys = key_scans(log, _STEP_M, _STEP_RAD)
+def polish(
+    log: Log, poses: Floats, noise: OdometryNoise, movable: Callable[[int, Floats], NDArray[np.bool_]] | None = None
+) -> Floats:
+    """(S, 3) of every scan, from ``poses`` (S, 3) that are right within a decimetre or two.
+
+    ``movable`` tells which of points (N, 2), seen from the robot at a scan, are of things that may have been moved
+    while it was parked: scans before and after that are matched without them."""
+    keys = spaced(log, _STEP_M, _STEP_RAD)
     path = poses[keys]
     lines = [lines_of(log, int(key)) for key in keys]
-    chain = _odometry(log, keys, noise)
-    for number, reach in enumerate(_REACHES_M):
-        pairs = _pairs(path)
-        loops = _matched(path, pairs, lines, reach)
-        path = optimise(path, chain, loops, _SWITCH)
-        progress((number + 1) / len(_REACHES_M))
+    static = lines if movable is None else [_static(one, int(k), movable) for one, k in zip(lines, keys, strict=True)]
+    legs = legs_of(log.t)[keys]
+    match = Matcher(lines, static, legs, movable is not None)
+    chain = joined(_odometry(log, keys, noise), match.steps(path, log.odometry[keys]))
+    if movable is not None:
+        # Each time by itself at first: what was moved lets go of the path.
+        path = optimise(path, chain, match.revisits(path, _REACHES_M[0], within_legs=True))
+    for reach in _REACHES_M if movable is None else (*_WIDELY_M, *_REACHES_M):
+        loops = match.revisits(path, reach)
+        # Torn far at first, all pull with full weight; who is alone against the others lets go then.
+        path = optimise(path, chain, loops, np.inf if reach in _WIDELY_M else _SWITCH)
     return poses_of_all(log, keys, path)
+
+
+def legs_of(t: Floats) -> NDArray[np.int64]:
+    """(S,) how often the robot was parked before each record."""
+    numbers: NDArray[np.int64] = np.concatenate([[0], np.cumsum(np.diff(t) >= PARKED_S)]).astype(np.int64)
+    return numbers
+
+
+def _static(lines: Lines, n: int, movable: Callable[[int, Floats], NDArray[np.bool_]]) -> Lines:
+    gone = np.zeros(len(lines.points), dtype=np.bool_)
+    met = np.flatnonzero(~np.isnan(lines.points[:, 0]))
+    gone[met] = movable(n, lines.points[met])
+    return lines.without(gone)
 
 
 def _odometry(log: Log, keys: Indices, noise: OdometryNoise) -> Edges:
@@ -56,9 +88,52 @@ def _odometry(log: Log, keys: Indices, noise: OdometryNoise) -> Edges:
     return Edges(numbers[:-1], numbers[1:], motions, information)
 
 
-def _pairs(path: Floats) -> list[tuple[int, int]]:
-    """(earlier, later) keys that saw the same."""
-    found = {(k - back, k) for k in range(len(path)) for back in _BEFORE if k >= back}
+class Matcher:
+    """Matches of key scans: ``lines`` of all that they saw, ``static`` of what cannot be moved; ``sliding`` matches
+    along a corridor do not count."""
+
+    def __init__(self, lines: list[Lines], static: list[Lines], legs: NDArray[np.int64], sliding: bool) -> None:
+        self._lines, self._static, self._legs, self._sliding = lines, static, legs, sliding
+
+    def steps(self, path: Floats, ways: Floats) -> Edges:
+        """Each with those just before it, by ``path`` (K, 3), or by odometry ``ways`` (K, 3) where the path is torn."""
+        numbers = range(len(ways))
+        pairs = [(k - back, k) for k in numbers for back in _BEFORE if k >= back and self._same_leg(k - back, k)]
+        return self._matched(path, pairs, _REACHES_M[0], ways)
+
+    def revisits(self, path: Floats, reach: float, within_legs: bool = False) -> Edges:
+        """Each with some of other times whose lines are within ``reach`` m, by ``path`` (K, 3)."""
+        pairs = [pair for pair in _revisits(path) if not within_legs or self._same_leg(*pair)]
+        return self._matched(path, pairs, reach)
+
+    def _same_leg(self, a: int, b: int) -> bool:
+        return bool(self._legs[a] == self._legs[b])
+
+    def _matched(self, path: Floats, pairs: list[tuple[int, int]], reach: float, ways: Floats | None = None) -> Edges:
+        kept, seen, information = [], [], []
+        for earlier, later in pairs:
+            start = between(path[earlier], path[later])
+            if ways is not None:
+                driven = between(ways[earlier], ways[later])
+                start = driven if np.hypot(*(start - driven)[:2]) > _TORN_M else start
+            same = self._same_leg(earlier, later)
+            these, within = (self._lines, min(reach, _REACHES_M[0])) if same else (self._static, reach)
+            pose, hessian, share = match_lines(these[earlier], these[later], start, within, _SIGMA_M)
+            if share < _SHARE or np.hypot(*(pose - start)[:2]) > 2 * within:
+                continue
+            if self._sliding and (not same or np.cos(start[2]) < 0):
+                hessian = _without_slide(hessian, _SLIDES if not same else 1.0)
+            covariance = np.linalg.inv(hessian + np.diag([1e-2, 1e-2, 1e-2])) * _WITNESSES + np.diag(np.square(_FLOOR))
+            kept.append((earlier, later))
+            seen.append(pose)
+            information.append(np.linalg.inv(covariance))
+        ends = np.array(kept, dtype=np.int64).reshape(-1, 2)
+        return Edges(ends[:, 0], ends[:, 1], np.array(seen).reshape(-1, 3), np.array(information).reshape(-1, 3, 3))
+
+
+def _revisits(path: Floats) -> list[tuple[int, int]]:
+    """(earlier, later) keys that saw the same at other times."""
+    found = set()
     ahead = compose(path, np.broadcast_to([_AHEAD_M, 0.0, 0.0], path.shape))[:, :2]
     tree = cKDTree(ahead)
     for k, near in enumerate(tree.query_ball_point(ahead, _NEAR_M)):
@@ -75,16 +150,12 @@ def _pairs(path: Floats) -> list[tuple[int, int]]:
     return sorted(found)
 
 
-def _matched(path: Floats, pairs: list[tuple[int, int]], lines: list[Lines], reach: float) -> Edges:
-    kept, seen, information = [], [], []
-    for earlier, later in pairs:
-        start = between(path[earlier], path[later])
-        pose, hessian, share = match_lines(lines[earlier], lines[later], start, reach, _SIGMA_M)
-        if share < _SHARE or np.hypot(*(pose - start)[:2]) > 2 * reach:
-            continue
-        covariance = np.linalg.inv(hessian + np.diag([1e-2, 1e-2, 1e-2])) * _WITNESSES + np.diag(np.square(_FLOOR))
-        kept.append((earlier, later))
-        seen.append(pose)
-        information.append(np.linalg.inv(covariance))
-    ends = np.array(kept, dtype=np.int64).reshape(-1, 2)
-    return Edges(ends[:, 0], ends[:, 1], np.array(seen).reshape(-1, 3), np.array(information).reshape(-1, 3, 3))
+def _without_slide(hessian: Floats, below: float) -> Floats:
+    """(3, 3) without what it says of the direction in which one scan can slide along the other: along a corridor each
+    match stays about where it began, and hundreds that do hold a path where it is."""
+    values, vectors = np.linalg.eigh(hessian[:2, :2])
+    if values[0] > below * values[1] or values[0] < 1.0:
+        return hessian
+    told = hessian @ np.array([*vectors[:, 0], 0.0])
+    left: Floats = hessian - np.outer(told, told) / values[0]
+    return left

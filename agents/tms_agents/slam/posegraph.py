@@ -51,7 +51,7 @@ def optimise(poses: Floats, chain: Edges, loops: Edges, switch: float = np.inf) 
     """``poses`` (N, 3) that fit all edges best; the first stays. A loop's weight falls once its chi2 is above
     ``switch``."""
     found = poses.copy()
-    edges = Edges(*(np.concatenate(pair) for pair in zip(_arrays(chain), _arrays(loops), strict=True)))
+    edges = joined(chain, loops)
     scale = np.ones(len(edges))
     for _ in range(_ITERATIONS):
         if np.isfinite(switch) and len(loops):
@@ -63,6 +63,11 @@ def optimise(poses: Floats, chain: Edges, loops: Edges, switch: float = np.inf) 
         if np.abs(step).max() < _SMALL:
             break
     return found
+
+
+def joined(first: Edges, second: Edges) -> Edges:
+    """All edges of both."""
+    return Edges(*(np.concatenate(pair) for pair in zip(_arrays(first), _arrays(second), strict=True)))
 
 
 def _arrays(edges: Edges) -> tuple[Indices, Indices, Floats, Floats]:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tms_agents.robot.records import Drive, Moved, Round, Scanned
 from tms_agents.robot.replaying import record_of
-from tms_agents.slam.semidynamic.visits import PARKED_S, passes_of
+from tms_agents.slam.polishing import PARKED_S, legs_of
 
 LASER = np.array([0.1, 0.0, 0.0])
 
@@ -41,7 +41,7 @@ def test_what_comes_while_it_is_parked_is_left_out() -> None:
     assert not drive.parked and drive.legs == 2 and drive.fresh == {"E1", "E2"}  # read anew in this leg
     after = drive.snapshot()
     assert after is not None
-    assert np.diff(after.log.t).max() >= PARKED_S and passes_of(after.log.t).max() == 1
+    assert np.diff(after.log.t).max() >= PARKED_S and legs_of(after.log.t).max() == 1
     np.testing.assert_allclose(after.times[0], 100.01)
     assert 180.0 < after.times[-1] < 190.0  # the devices' own clock
     np.testing.assert_allclose(after.log.odometry[-1, 0], x + 0.5 * (after.times[-1] - 180.0), atol=0.006)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tms_agents.slam.geometry import Floats, compose, inverse, wrapped
@@ -93,10 +95,23 @@ def _readers(sight: Sight) -> Floats:
 
 def _apart(poses: Floats) -> Floats:
     """Those of ``poses`` (N, 3), the best first, that are not nearly one that comes before them."""
-    kept: list[Floats] = []
-    for pose in poses:
-        if all(
-            np.hypot(*(pose - other)[:2]) > _SAME_M or abs(wrapped(pose[2] - other[2])) > _SAME_RAD for other in kept
-        ):
-            kept.append(pose)
-    return np.array(kept).reshape(-1, 3)
+    kept: Floats = poses[_apart_from_better(poses)]
+    return kept
+
+
+@njit(cache=True)
+def _apart_from_better(poses: Floats) -> NDArray[np.int64]:
+    kept, count = np.empty(len(poses), dtype=np.int64), 0
+    for n in range(len(poses)):
+        alone = True
+        for k in range(count):
+            other = poses[kept[k]]
+            if (poses[n, 0] - other[0]) ** 2 + (poses[n, 1] - other[1]) ** 2 <= _SAME_M * _SAME_M:
+                turn = abs(poses[n, 2] - other[2]) % (2 * np.pi)
+                if min(turn, 2 * np.pi - turn) <= _SAME_RAD:
+                    alone = False
+                    break
+        if alone:
+            kept[count] = n
+            count += 1
+    return kept[:count]

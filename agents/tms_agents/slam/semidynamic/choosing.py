@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import cKDTree
+from numba import njit
+from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats, transform, wrapped
 from tms_agents.slam.semidynamic.shapes import Shape
@@ -43,6 +44,8 @@ class Track:
     total: float = 0.0
     #: By the array of poses, the other tag and its pose: what they share.
     overlaps: dict[tuple[int, str, bytes], Floats] = field(default_factory=dict)
+    #: By family and visit: which poses are those of the visit before.
+    same: dict[tuple[int, int], NDArray[np.bool_]] = field(default_factory=dict)
 
     def outline(self, pose: Floats) -> Floats:
         return transform(pose, self.shape.outline)
@@ -77,7 +80,7 @@ def _improve(tracks: Mapping[str, Track], at_once: _Shared) -> None:
             _solve(tracks[tag], tracks, at_once)
             changed |= abs(tracks[tag].total - before) > _SAME_SCORE
         for a, b in itertools.combinations(sorted(tracks), 2):
-            if any(other == b for _, other, _ in at_once[a]):
+            if any(other == b for visit in at_once[a] for other, _ in visit):
                 changed |= _again(tracks[a], tracks[b], tracks, at_once)
         if not changed:
             break
@@ -92,17 +95,17 @@ def _total(tracks: Mapping[str, Track], at_once: _Shared) -> float:
     return total
 
 
-_Shared = Mapping[str, Sequence[tuple[int, str, int]]]
+_Shared = Mapping[str, Sequence[Sequence[tuple[str, int]]]]
 
 
 def _at_once(tracks: Mapping[str, Track]) -> _Shared:
-    """Per tag: (its visit, another tag, that one's visit) that share scans."""
-    found: dict[str, list[tuple[int, str, int]]] = {tag: [] for tag in tracks}
+    """Per tag and visit: other tags and their visits that share scans."""
+    found: dict[str, list[list[tuple[str, int]]]] = {tag: [[] for _ in one.visits] for tag, one in tracks.items()}
     for a, b in itertools.permutations(tracks, 2):
         for i, visit in enumerate(tracks[a].visits):
             for j, other in enumerate(tracks[b].visits):
                 if len(np.intersect1d(visit.scans, other.scans)):
-                    found[a].append((i, b, j))
+                    found[a][i].append((b, j))
     return found
 
 
@@ -146,18 +149,21 @@ def _viterbi(
     without: frozenset[str] = frozenset(),
 ) -> tuple[Floats, float]:
     best, found = -np.inf, np.empty((0, 3))
-    for family in track.families:
+    for which, family in enumerate(track.families):
+        rows: list[NDArray[np.bool_]] = []
+        if fixed is not None:
+            rows = [(poses == pose).all(axis=1) for poses, pose in zip(family.poses, fixed, strict=True)]
+            if not all(row.any() for row in rows):
+                continue
         costs = []
         for number, (poses, scores) in enumerate(zip(family.poses, family.scores, strict=True)):
             score = scores - _shared(track, number, poses, tracks, at_once, without)
-            if fixed is not None:
-                score = np.where((poses == fixed[number]).all(axis=1), score, -np.inf)
+            if rows:
+                score = np.where(rows[number], score, -np.inf)
             costs.append(score)
-        if fixed is not None and any(np.isneginf(score).all() for score in costs):
-            continue
         total, back = costs[0], []
         for number in range(1, len(costs)):
-            step = total[:, None] + _stays(track, number, family)
+            step = total[:, None] + _stays(track, number, which)
             back.append(np.argmax(step, axis=0))
             total = step.max(axis=0) + costs[number]
         last = int(np.argmax(total))
@@ -170,13 +176,15 @@ def _viterbi(
     return found, best
 
 
-def _stays(track: Track, number: int, family: Family) -> Floats:
+def _stays(track: Track, number: int, which: int) -> Floats:
     """(C, D) what it is worth that the pose before visit ``number`` is the pose in it."""
-    before, after = family.poses[number - 1], family.poses[number]
-    apart = after[None, :, :] - before[:, None, :]
-    same = (np.hypot(apart[..., 0], apart[..., 1]) < SAME_M) & (np.abs(wrapped(apart[..., 2])) < SAME_RAD)
+    if (which, number) not in track.same:
+        before, after = (track.families[which].poses[n] for n in (number - 1, number))
+        apart = after[None, :, :] - before[:, None, :]
+        near = np.hypot(apart[..., 0], apart[..., 1]) < SAME_M
+        track.same[which, number] = near & (np.abs(wrapped(apart[..., 2])) < SAME_RAD)
     bonus = _SAME_PASS if track.visits[number].leg == track.visits[number - 1].leg else _SAME_PLACE
-    found: Floats = bonus * same
+    found: Floats = np.where(track.same[which, number], bonus, 0.0)
     return found
 
 
@@ -185,11 +193,10 @@ def _shared(
 ) -> Floats:
     """(C,) what other objects at the same time already explain."""
     total: Floats = np.zeros(len(poses))
-    for mine, tag, theirs in at_once[track.tag]:
+    for tag, theirs in at_once[track.tag][number]:
         chosen = tracks[tag].chosen
-        if mine != number or chosen is None or tag in without:
-            continue
-        total += _overlap(track, poses, tracks[tag], chosen[theirs])
+        if chosen is not None and tag not in without:
+            total += _overlap(track, poses, tracks[tag], chosen[theirs])
     return total
 
 
@@ -197,11 +204,26 @@ def _overlap(track: Track, poses: Floats, other: Track, pose: Floats) -> Floats:
     """(C,) what an object at ``poses`` shares with the ``other`` one at ``pose``."""
     key = (id(poses), other.tag, pose.tobytes())
     if key not in track.overlaps:
-        found = np.zeros(len(poses))
-        tree = cKDTree(other.outline(pose))
         near = np.hypot(*(poses[:, :2] - pose[:2]).T) < track.shape.size + other.shape.size
-        for n in np.flatnonzero(near):
-            apart, _ = tree.query(track.outline(poses[n]), distance_upper_bound=_SHARED_M)
-            found[n] = _SHARED * np.count_nonzero(np.isfinite(apart))
+        found = np.zeros(len(poses))
+        if near.any():
+            found[near] = _SHARED * _near_points(poses[near], track.shape.outline, other.outline(pose), _SHARED_M)
         track.overlaps[key] = found
     return track.overlaps[key]
+
+
+@njit(cache=True)
+def _near_points(poses: Floats, outline: Floats, other: Floats, reach: float) -> Floats:
+    """(C,) how many points of ``outline`` (M, 2), seen from ``poses`` (C, 3), are within ``reach`` m of ``other``
+    points (N, 2)."""
+    found = np.zeros(len(poses))
+    for n in range(len(poses)):
+        c, s = np.cos(poses[n, 2]), np.sin(poses[n, 2])
+        for m in range(len(outline)):
+            x = poses[n, 0] + c * outline[m, 0] - s * outline[m, 1]
+            y = poses[n, 1] + s * outline[m, 0] + c * outline[m, 1]
+            for k in range(len(other)):
+                if (other[k, 0] - x) ** 2 + (other[k, 1] - y) ** 2 < reach * reach:
+                    found[n] += 1.0
+                    break
+    return found

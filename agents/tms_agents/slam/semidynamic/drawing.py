@@ -10,18 +10,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from tms_agents.slam.geometry import Floats, transform
 from tms_agents.slam.gridmap import GridMap, grid_map, render
 from tms_agents.slam.keyframes import key_scans
 from tms_agents.slam.logs import Log
 from tms_agents.slam.occupancy import HIGHEST
+from tms_agents.slam.polishing import legs_of
 from tms_agents.slam.semidynamic.evidence import CELL_M, Place, count_beams
 from tms_agents.slam.semidynamic.models import Models
+from tms_agents.slam.semidynamic.outlines import Outlines
 from tms_agents.slam.semidynamic.shapes import surface
 from tms_agents.slam.semidynamic.solving import Stay
-from tms_agents.slam.semidynamic.visits import passes_of
 
 #: Beams that end so near to an outline (m) are the object's.
 _OWN_M = 0.08
@@ -34,8 +34,8 @@ _SEEN_THROUGH, _ENOUGH = 0.5, 4
 def draw(log: Log, poses: Floats, stays: Mapping[str, Sequence[Stay]], models: Models, resolution: float) -> GridMap:
     """Cells of ``resolution`` m, with the objects where they stood last."""
     scans = key_scans(log, _STEP_M, _STEP_RAD)
-    legs = passes_of(log.t)
-    points = [_static(log, poses, int(n), legs, stays, models) for n in scans]
+    legs, outlines = legs_of(log.t), Outlines(log.t, stays, models)
+    points = [_static(log, poses, int(n), outlines) for n in scans]
     grid = grid_map(render(poses[scans], points, log.laser[:2], resolution, _REACH_M), 0)
     cells = grid.cells.copy()
     for tag, found in stays.items():
@@ -48,34 +48,11 @@ def draw(log: Log, poses: Floats, stays: Mapping[str, Sequence[Stay]], models: M
     return GridMap(cells, grid.origin, resolution)
 
 
-def _static(
-    log: Log,
-    poses: Floats,
-    n: int,
-    legs: NDArray[np.int64],
-    stays: Mapping[str, Sequence[Stay]],
-    models: Models,
-) -> Floats:
+def _static(log: Log, poses: Floats, n: int, outlines: Outlines) -> Floats:
     """Points of scan ``n``, seen from the robot, that are no object's."""
     points = log.points(n)
-    there = transform(poses[n], points)
-    kept = np.ones(len(points), dtype=np.bool_)
-    for tag, found in stays.items():
-        stay = stay_at(found, n, legs)
-        if stay is None:
-            continue
-        outline = surface(models.objects[tag], stay.pose)
-        near = kept & (np.hypot(*(there - outline.mean(axis=0)).T) < 2.0)
-        if near.any():
-            apart, _ = cKDTree(outline).query(there[near], distance_upper_bound=_OWN_M)
-            kept[np.flatnonzero(near)[np.isfinite(apart)]] = False
-    return points[kept]
-
-
-def stay_at(stays: Sequence[Stay], n: int, legs: NDArray[np.int64]) -> Stay | None:
-    """Where an object stood at scan ``n``: its stay of that leg that was nearest in time, if there is one."""
-    same = [stay for stay in stays if stay.visit.leg == legs[n] and len(stay.visit.scans)]
-    return min(same, key=lambda stay: int(np.abs(stay.visit.scans - n).min()), default=None)
+    kept: Floats = points[~outlines.own(n, transform(poses[n], points), _OWN_M)]
+    return kept
 
 
 def _gone(log: Log, poses: Floats, legs: NDArray[np.int64], last: Stay, outline: Floats) -> bool:

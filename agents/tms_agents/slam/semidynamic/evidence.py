@@ -48,14 +48,12 @@ class Place:
 @dataclass(frozen=True, slots=True, eq=False)
 class Beams:
     """``hits`` and ``passes`` (H, W): beams that ended in a cell, that went on beyond it; ``course`` (H, W, 2): sum of
-    the directions of those that ended there."""
+    the directions of those that ended there, ``ends`` (H, W, 2) of where they did (cells from the corner)."""
 
     hits: Counts
     passes: Counts
     course: Floats
-
-    def without(self, other: Beams) -> Beams:
-        return Beams(self.hits - other.hits, self.passes - other.passes, self.course - other.course)
+    ends: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +61,8 @@ class Worth:
     """Log-odds (H, W) of a point of an outline in a cell: ``seen`` if it faces ``towards`` (H, W, 2), the unit vector
     to where beams that ended near came from, ``through`` in any case; ``inside`` of a point inside. ``always`` is what
     is seen where something was at other times, too: an object that did not move, or a wall; ``wall`` is where that is
-    or nearly."""
+    or nearly. ``surface`` (H, W, 2) is where beams ended around a cell on the average (m from the corner; NaN: none
+    did), which is finer than cells are."""
 
     seen: Floats
     always: Floats
@@ -71,18 +70,19 @@ class Worth:
     through: Floats
     inside: Floats
     wall: NDArray[np.bool_]
+    surface: Floats
 
 
 def count_beams(place: Place, log: Log, poses: Floats, scans: NDArray[np.int64]) -> Beams:
     """Of ``scans`` (indices) of ``log`` at ``poses`` (S, 3)."""
     hits = np.zeros((place.height, place.width), dtype=np.int32)
     passes = np.zeros_like(hits)
-    course = np.zeros((*hits.shape, 2))
+    course, ends = np.zeros((*hits.shape, 2)), np.zeros((*hits.shape, 2))
     count(
         poses, log.laser, log.ranges, log.angles, log.range_max, scans, place.corner, CELL_M, _BLUR_M,
-        hits, passes, course,
+        hits, passes, course, ends,
     )  # fmt: skip
-    return Beams(hits, passes, course)
+    return Beams(hits, passes, course, ends)
 
 
 def worth(now: Beams, other: Beams) -> Worth:
@@ -99,7 +99,7 @@ def worth(now: Beams, other: Beams) -> Worth:
     through = known * _THROUGH * np.clip(1 - 2.5 * share, 0, 1) * (1 - sharp)
     inside = _INSIDE * np.minimum(now.passes / _ENOUGH, 1.0) * np.clip(1 - 2 * share, 0, 1)
     wall = maximum_filter(always * sharp, 5) > 0.2
-    return Worth(_SEEN * (1 - always) * seen, _ALWAYS * always * seen, towards, through, inside, wall)
+    return Worth(_SEEN * (1 - always) * seen, _ALWAYS * always * seen, towards, through, inside, wall, _surface(now))
 
 
 def _always(other: Beams) -> Floats:
@@ -107,6 +107,15 @@ def _always(other: Beams) -> Floats:
     near = maximum_filter(other.hits, 3).astype(np.float64)
     passes = uniform_filter(other.passes.astype(np.float64), 3)
     found: Floats = np.clip(near / _ENOUGH, 0, 1) * np.clip(1.5 * near / np.maximum(near + passes, 1) - 0.25, 0, 1)
+    return found
+
+
+def _surface(beams: Beams) -> Floats:
+    """Of nine cells."""
+    number = uniform_filter(beams.hits.astype(np.float64), 3)
+    sums = np.stack([uniform_filter(beams.ends[..., axis], 3) for axis in (0, 1)], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Floats = np.where(number[..., None] > 0.1, CELL_M * sums / number[..., None], np.nan)
     return found
 
 
@@ -124,6 +133,7 @@ def count(
     hits: Counts,
     passes: Counts,
     course: Floats,
+    ends: Floats,
 ) -> None:
     """Follow every beam through the cells of the square."""
     height, width = hits.shape
@@ -138,9 +148,12 @@ def count(
                 continue
             angle = poses[s, 2] + laser[2] + angles[b]
             dx, dy = np.cos(angle), np.sin(angle)
-            x, y = int(np.floor(x0 + dx * r / cell)), int(np.floor(y0 + dy * r / cell))
+            x_end, y_end = x0 + dx * r / cell, y0 + dy * r / cell
+            x, y = int(np.floor(x_end)), int(np.floor(y_end))
             if 0 <= x < width and 0 <= y < height:
                 hits[y, x] += 1
+                ends[y, x, 0] += x_end
+                ends[y, x, 1] += y_end
                 course[y, x, 0] += dx
                 course[y, x, 1] += dy
             # The part of the beam inside the square, in cells from the laser.

@@ -16,6 +16,8 @@ from tms_agents.slam.semidynamic.visits import Visit
 _AROUND_M = 3.2
 #: Of the rounds that did not read a tag, one in so many is looked at, for all of them.
 _EVERY = 4
+#: So many scans of other times are enough to tell what is always there.
+_OTHERS = 500
 
 
 def sight_of(visit: Visit, log: Log, poses: Floats, rounds: Rounds, round_poses: Floats, models: Models) -> Sight:
@@ -25,7 +27,8 @@ def sight_of(visit: Visit, log: Log, poses: Floats, rounds: Rounds, round_poses:
     now = count_beams(place, log, poses, visit.scans)
     near = place.distance(poses[:, :2]) < log.range_max
     near[visit.scans] = False
-    other = count_beams(place, log, poses, np.flatnonzero(near))
+    elsewhen = np.flatnonzero(near)
+    other = count_beams(place, log, poses, elsewhen[:: 1 + len(elsewhen) // _OTHERS])
     heard = []
     for number, antenna in models.antennas.items():
         mine = visit.rounds[rounds.antenna[visit.rounds] == number]

@@ -13,6 +13,7 @@ from tms_agents.slam.geometry import Floats, compose
 from tms_agents.slam.semidynamic.antenna import read_odds
 from tms_agents.slam.semidynamic.evidence import CELL_M, Place, Worth
 from tms_agents.slam.semidynamic.models import Antenna, ObjectModel
+from tms_agents.slam.semidynamic.recesses import goes_on
 from tms_agents.slam.semidynamic.shapes import Shape
 
 #: Nobody reads a tag through a wall: what is nowhere seen, but was read, costs so much.
@@ -46,8 +47,8 @@ class Sight:
         found = np.empty(len(poses))
         cells = self.cells
         _sums(
-            poses, shape.outline, shape.normals, shape.beyond, shape.inside, cells.seen, cells.always, cells.towards,
-            cells.through, cells.inside, cells.wall, self.place.corner, CELL_M, found,
+            poses, shape.outline, shape.normals, shape.beyond, shape.inside, shape.hinged, cells.seen, cells.always,
+            cells.towards, cells.through, cells.inside, cells.wall, cells.surface, self.place.corner, CELL_M, found,
         )  # fmt: skip
         return found + _UNSEEN * np.clip(1 - found / _SEEN_ENOUGH, 0, 1)
 
@@ -67,12 +68,14 @@ def _sums(
     normals: Floats,
     beyond: Floats,
     inside: Floats,
+    hinged: bool,
     seen: Floats,
     always: Floats,
     towards: Floats,
     through: Floats,
     deep: Floats,
     wall: NDArray[np.bool_],
+    surface: Floats,
     corner: Floats,
     cell: float,
     found: Floats,
@@ -81,7 +84,7 @@ def _sums(
     for n in range(poses.shape[0]):
         c, s = np.cos(poses[n, 2]), np.sin(poses[n, 2])
         left, low = poses[n, 0] - corner[0], poses[n, 1] - corner[1]
-        total, usual, goes_on = 0.0, 0.0, 0
+        total, usual = 0.0, 0.0
         for m in range(outline.shape[0]):
             x = int((left + c * outline[m, 0] - s * outline[m, 1]) / cell)
             y = int((low + s * outline[m, 0] + c * outline[m, 1]) / cell)
@@ -99,11 +102,8 @@ def _sums(
             if 0 <= x < width and 0 <= y < height:
                 total += deep[y, x]
         if usual > 0.0:
-            # What goes on past the ends of the object is a wall.
-            for m in range(beyond.shape[0]):
-                x = int((left + c * beyond[m, 0] - s * beyond[m, 1]) / cell)
-                y = int((low + s * beyond[m, 0] + c * beyond[m, 1]) / cell)
-                if 0 <= x < width and 0 <= y < height and wall[y, x]:
-                    goes_on += 1
-            total += usual * max(1.0 - 2.0 * goes_on / max(beyond.shape[0], 1), 0.0)
+            past = goes_on(
+                poses[n], outline, normals, beyond, hinged, towards, wall, surface, corner, cell
+            )  # fmt: skip
+            total += usual * max(1.0 - 2.0 * past, 0.0)
         found[n] = total

@@ -18,12 +18,13 @@ _BEYOND_M, _EDGE_M = (0.10, 0.16, 0.22), 0.2
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
     """``outline`` (M, 2) with outward ``normals`` (M, 2), ``inside`` (I, 2), and ``beyond`` (B, 2) in line with the
-    edges but past their ends, m in the object's frame."""
+    edges but past their ends, m in the object's frame. What is ``hinged`` is a panel along x."""
 
     outline: Floats
     normals: Floats
     beyond: Floats
     inside: Floats
+    hinged: bool
 
     @property
     def size(self) -> float:
@@ -35,7 +36,7 @@ def shape_of(model: ObjectModel) -> Shape:
     edges = [_edges(part) for part in model.parts]
     inside = np.concatenate([_inside(part) for part in model.parts])
     outline, normals, beyond = (np.concatenate(one) for one in zip(*edges, strict=True))
-    return Shape(outline, normals, beyond, inside)
+    return Shape(outline, normals, beyond, inside, model.hinged)
 
 
 def surface(model: ObjectModel, pose: Floats) -> Floats:

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats
+from tms_agents.slam.polishing import legs_of
 from tms_agents.slam.semidynamic.reads import Rounds
 
-#: The robot was parked where records are so far apart (s).
-PARKED_S = 600.0
 #: So far from the middle of the reads the robot is away (m), and so near it may see the object.
 _AWAY_M, _NEAR_M = 9.0, 6.0
 
@@ -33,12 +32,6 @@ class Visit:
     leg: int
 
 
-def passes_of(t: Floats) -> NDArray[np.int64]:
-    """(S,) number of the pass of each record: a new one begins after every long pause."""
-    numbers: NDArray[np.int64] = np.concatenate([[0], np.cumsum(np.diff(t) >= PARKED_S)]).astype(np.int64)
-    return numbers
-
-
 def visits_of(tag: str, rounds: Rounds, round_poses: Floats, scan_t: Floats, scan_poses: Floats) -> list[Visit]:
     """Of ``tag``, in order of time; poses (R, 3) and (S, 3) of the robot at rounds and scans."""
     numbers = np.flatnonzero(rounds.read(tag))
@@ -47,7 +40,7 @@ def visits_of(tag: str, rounds: Rounds, round_poses: Floats, scan_t: Floats, sca
     times = np.concatenate([rounds.t, scan_t])
     order = np.argsort(times, kind="stable")
     pass_of = np.empty(len(times), dtype=np.int64)
-    pass_of[order] = passes_of(times[order])
+    pass_of[order] = legs_of(times[order])
     round_pass, scan_pass = pass_of[: len(rounds.t)], pass_of[len(rounds.t) :]
     groups: list[list[int]] = [[int(numbers[0])]]
     for number in numbers[1:]:
