@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from argparse import BooleanOptionalAction
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 
 from tms_agents.simulation.demo import Plan, run
+from tms_agents.simulation.leaving import Leaving
 from tms_agents.simulation.robot_demo import run as run_robot
 from tms_agents.simulation.terminal import Terminal
 from tms_client.cli import ArgumentParser, CommandError
@@ -53,21 +52,17 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError("--port and --data-dir are for a server of our own, not with --url")
     if arguments.seed < 0:
         raise CommandError(f"--seed must not be negative, got {arguments.seed}")
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _leave)
+    leaving = Leaving()
+    leaving.listen()
     try:
         robot = vars(arguments).pop("robot")
         if robot and (arguments.weights or arguments.laser is not None):
             raise CommandError("--weights and --laser belong to the other story, not to --robot")
         tell = run_robot if robot else run
-        return 0 if tell(Plan(**vars(arguments)), Terminal(sys.stdout)) else 1
+        return 0 if tell(Plan(**vars(arguments)), Terminal(sys.stdout), sleep=leaving.sleep) else 1
     except KeyboardInterrupt:
         sys.stdout.write("\n")
         return 0 if not arguments.once else 130
-
-
-def _leave(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 def _speed(text: str) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -51,7 +52,12 @@ class Plan:
     seed: int = 0
 
 
-def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW) -> bool:
+def run(
+    plan: Plan,
+    terminal: Terminal,
+    clock: Callable[[], datetime] = UTC_NOW,
+    sleep: Callable[[float], object] = time.sleep,
+) -> bool:
     """Play the story; True where every pie was as expected. Goes on living until Ctrl-C unless ``plan.once``."""
     no_laser = why_no_laser(plan.laser, plan.speed)
     with ExitStack() as stack:
@@ -76,6 +82,7 @@ def run(plan: Plan, terminal: Terminal, clock: Callable[[], datetime] = UTC_NOW)
                     speed=plan.speed,
                     laser=no_laser is None,
                     clock=clock,
+                    sleep=sleep,
                 )
             )
             terminal.devices(stage.hardware.plugs, stage.configs, {} if no_laser is None else {FLOOR_AGENT: no_laser})

@@ -32,7 +32,7 @@ _PARKED_S = 2.0
 _NAMES = ("Door of room 1", "Door of room 2", "Bin at the window", "Bin at the wall")
 
 
-def run(plan: Plan, terminal: Terminal) -> bool:
+def run(plan: Plan, terminal: Terminal, sleep: Callable[[float], object] = time.sleep) -> bool:
     """True where the server's doors were at the end as they are in the ward.
 
     Raises:
@@ -63,11 +63,11 @@ def run(plan: Plan, terminal: Terminal) -> bool:
                 f"  {MAPPER_AGENT}: Pioneer {stage.base_path}; SCIP laser tcp 127.0.0.1:{stage.laser_port}; "
                 f"LLRP reader tcp 127.0.0.1:{stage.reader.port}; tms agent robot --config {config}"
             )
-            right = _Story(town, plan.room, stage, agents, terminal.say).play()
+            right = _Story(town, plan.room, stage, agents, terminal.say, sleep).play()
             if not plan.once:
                 terminal.say(f"\nThe map stays; look at {url}/ (Ctrl-C ends it).")
                 while True:
-                    time.sleep(1.0)
+                    sleep(1.0)
         except TownError as error:
             raise CommandError(str(error)) from error
     return right
@@ -124,8 +124,17 @@ def map_id(room: str) -> str:
 
 
 class _Story:
-    def __init__(self, town: Town, room: str, stage: RobotStage, agents: Agents, say: Callable[[str], None]) -> None:
-        self._town, self._room, self._stage, self._agents, self._say = town, room, stage, agents, say
+    def __init__(
+        self,
+        town: Town,
+        room: str,
+        stage: RobotStage,
+        agents: Agents,
+        say: Callable[[str], None],
+        sleep: Callable[[float], object],
+    ) -> None:
+        self._town, self._room, self._stage, self._agents = town, room, stage, agents
+        self._say, self._sleep = say, sleep
         self._version = self._legs = 0
 
     def play(self) -> bool:
@@ -197,7 +206,7 @@ class _Story:
                 raise CommandError(f"{otherwise}: {self._agents.last_words(MAPPER_AGENT)}")
             if self._stage.listened_to and not self._stage.standing:
                 self._new_versions()
-            time.sleep(0.2)
+            self._sleep(0.2)
 
 
 def _until(versions: Iterable[MapVersion], known: int) -> list[MapVersion]:

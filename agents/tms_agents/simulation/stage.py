@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
@@ -69,6 +70,7 @@ def staged(
     speed: float,
     laser: bool = False,
     clock: Callable[[], datetime] = UTC_NOW,
+    sleep: Callable[[float], object] = time.sleep,
 ) -> Iterator[tuple[Stage, Player]]:
     """Devices plugged in, agents started, the room still empty. ``room`` must be registered; files go to ``folder``.
 
@@ -81,7 +83,7 @@ def staged(
         agents = stack.enter_context(running_agents(configs, url, key))
         if laser:
             stage = Stage(town, room, hardware, agents, None, configs)
-            player = Player(new_world(), Elsewhere(), stage, speed=speed, clock=clock)
+            player = Player(new_world(), Elsewhere(), stage, speed=speed, clock=clock, sleep=sleep)
             player.switch_on()
             yield stage, player
             return
@@ -91,6 +93,6 @@ def staged(
         stack.enter_context(poster)
         stage = Stage(town, room, hardware, agents, poster, configs)
         floor = FloorAgent(FLOOR_AGENT, np.random.default_rng([seed, 1]), spool.new_label)
-        player = Player(new_world(), floor, stage, speed=speed, clock=clock)
+        player = Player(new_world(), floor, stage, speed=speed, clock=clock, sleep=sleep)
         player.switch_on()
         yield stage, player
