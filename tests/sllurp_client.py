@@ -27,4 +27,5 @@ async def sllurp_reads(port: int, different: int = 1, **settings: object) -> set
     finally:
         await asyncio.to_thread(client.disconnect)
         await asyncio.to_thread(client.join, 5)
+        client.hard_disconnect()  # where the reader hangs up first, it leaves its socket open
     return got

@@ -38,15 +38,13 @@ _WITNESSES, _FLOOR = 20.0, (0.04, 0.04, 0.006)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closure:
-    """Key scan ``key`` seen from key scan ``anchor``, with ``information`` (3, 3); ``shift`` m from where it was
-    thought."""
+    """Key scan ``key`` seen from key scan ``anchor``, with ``information`` (3, 3)."""
 
     anchor: int
     key: int
     seen: Floats
     information: Floats
     fit: float
-    shift: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,8 +140,7 @@ def _closure(
         if placed is None or not _agrees(maps, which, cloud, placed[0]):
             return []
         pose, information = placed[0], _information(placed[1])
-    shift = float(np.hypot(*(pose - question.thought)[:2]))
-    return [Closure(int(submaps.anchors[question.number]), question.key, pose, information, float(fit), shift)]
+    return [Closure(int(submaps.anchors[question.number]), question.key, pose, information, float(fit))]
 
 
 def _information(hessians: Floats) -> Floats:

@@ -66,7 +66,7 @@ def test_revisits_must_bear_each_other_out():
 
     def closure(anchor: int, key: int, shift: float, fit: float = 0.95) -> Closure:
         seen = between(path[anchor], path[key]) + np.array([shift, 0.0, 0.0])
-        return Closure(anchor, key, seen, np.eye(3), fit, abs(shift))
+        return Closure(anchor, key, seen, np.eye(3), fit)
 
     right = [closure(10 + 4 * n, 72 + 4 * n, 0.05) for n in range(5)]
     one_door_off = [closure(12, 73, 4.0), closure(20, 81, 4.0), closure(24, 85, 4.0)]
