@@ -197,6 +197,6 @@ def _match(
         # Along a corridor nothing pulls; odometry, or another scan, knows better.
         move = np.linalg.solve(hessian + 1e-3 * np.trace(hessian) / 3.0 * np.eye(3), -gradient)
         pose += move
-        if math.hypot(move[0], move[1]) < 1e-4 and abs(move[2]) < 1e-5:
+        if math.hypot(move[0], move[1]) < 5e-4 and abs(move[2]) < 5e-5:
             break
     return share
