@@ -15,6 +15,10 @@ from tms_agents.slam.logs import Log
 #: A line is laid through the beams on either side as far as they belong to one surface (m), at least so many in all.
 _SIDE, _LEAST = 3, 4
 _GAP_M, _FLAT_M = 0.25, 0.02
+#: Beams are at least so noisy (m).
+_NOISE_M = 0.01
+#: What is known of a direction is so many times what errors of lines alone would seem to tell.
+_REAL = 2.0
 #: The nearest line is looked for among so many beams on either side.
 _WINDOW, _ITERATIONS = 14, 12
 
@@ -22,10 +26,11 @@ _WINDOW, _ITERATIONS = 14, 12
 @dataclass(frozen=True, slots=True, eq=False)
 class Lines:
     """Of one scan: ``points`` (B, 2) m seen from the robot (NaN: no return), unit ``normals`` (B, 2) there (0: no
-    line)."""
+    line), whose directions have variances ``turns`` (B,) rad^2."""
 
     points: Floats
     normals: Floats
+    turns: Floats
     laser: Floats
     first: float
     step: float
@@ -33,7 +38,8 @@ class Lines:
     def without(self, beams: NDArray[np.bool_]) -> Lines:
         """As if ``beams`` (B,) had not returned."""
         points = np.where(beams[:, None], np.nan, self.points)
-        return Lines(points, np.where(beams[:, None], 0.0, self.normals), self.laser, self.first, self.step)
+        normals = np.where(beams[:, None], 0.0, self.normals)
+        return Lines(points, normals, self.turns, self.laser, self.first, self.step)
 
 
 def lines_of(log: Log, n: int) -> Lines:
@@ -42,22 +48,46 @@ def lines_of(log: Log, n: int) -> Lines:
     r = np.where(log.returned(n), log.ranges[n], np.nan)
     points = np.stack([log.laser[0] + r * np.cos(angles), log.laser[1] + r * np.sin(angles)], axis=-1)
     normals = np.zeros_like(points)
-    _fit(points, normals)
-    return Lines(points, normals, log.laser, float(angles[0]), float(angles[1] - angles[0]))
+    turns = np.zeros(len(points))
+    _fit(points, normals, turns)
+    return Lines(points, normals, turns, log.laser, float(angles[0]), float(angles[1] - angles[0]))
 
 
 def match_lines(fixed: Lines, moving: Lines, start: Floats, reach: float, sigma: float) -> tuple[Floats, Floats, float]:
-    """Pose (3,) of ``moving`` seen from ``fixed``, its Gauss-Newton Hessian (3, 3), and the share of those points that
-    ought to be near a line that are nearer than ``reach`` m."""
-    pose, hessian = start.copy(), np.zeros((3, 3))
+    """Pose (3,) of ``moving`` seen from ``fixed``, its information (3, 3), and the share of those points that ought to
+    be near a line that are nearer than ``reach`` m.
+
+    Nothing is known of a direction in which one scan slides along the other, as in a bare corridor (Zhang, Kaess and
+    Singh 2016): there a match stays where it began."""
+    pose, hessian, imagined = start.copy(), np.zeros((3, 3)), np.zeros((3, 3))
     share = _match(
-        fixed.points, fixed.normals, fixed.laser, fixed.first, fixed.step, moving.points, reach, sigma, pose, hessian
-    )
-    return pose, hessian, share
+        fixed.points, fixed.normals, fixed.turns, fixed.laser, fixed.first, fixed.step, moving.points, reach, sigma,
+        pose, hessian, imagined,
+    )  # fmt: skip
+    return pose, _known(hessian, imagined), share
+
+
+def without(hessian: Floats, direction: Floats) -> Floats:
+    """(3, 3) without what it says of ``direction`` (3,)."""
+    told = hessian @ direction
+    left: Floats = hessian - np.outer(told, told) / (direction @ told)
+    return left
+
+
+def _known(hessian: Floats, imagined: Floats) -> Floats:
+    """``hessian`` (3, 3) less what the errors of the lines' directions make up: a wall whose lines are laid through
+    noise seems to have edges. Where there is hardly more than that, there is nothing."""
+    _, vectors = np.linalg.eigh(hessian[:2, :2])
+    slide = np.array([*vectors[:, 0], 0.0])
+    if slide @ hessian @ slide > _REAL * (slide @ imagined @ slide):
+        values, vectors = np.linalg.eigh(hessian - imagined)
+        left: Floats = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return left
+    return without(hessian, slide) if slide @ hessian @ slide > 0.0 else hessian
 
 
 @njit(cache=True)
-def _fit(points: Floats, normals: Floats) -> None:
+def _fit(points: Floats, normals: Floats, turns: Floats) -> None:
     count = points.shape[0]
     for b in range(count):
         if math.isnan(points[b, 0]):
@@ -84,12 +114,14 @@ def _fit(points: Floats, normals: Floats) -> None:
             continue
         angle = 0.5 * math.atan2(2.0 * h, a - d)
         normals[b, 0], normals[b, 1] = -math.sin(angle), math.cos(angle)
+        turns[b] = (small + _NOISE_M**2) / (n * (a + d - small))
 
 
 @njit(cache=True)
 def _match(
     points: Floats,
     normals: Floats,
+    turns: Floats,
     laser: Floats,
     first: float,
     step: float,
@@ -98,12 +130,14 @@ def _match(
     sigma: float,
     pose: Floats,
     hessian: Floats,
+    imagined: Floats,
 ) -> float:
     count = points.shape[0]
     gradient = np.zeros(3)
     share = 0.0
     for _ in range(_ITERATIONS):
         hessian[:] = 0.0
+        imagined[:] = 0.0
         gradient[:] = 0.0
         near, expected = 0, 0
         c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -146,13 +180,23 @@ def _match(
             hessian[1, 1] += weight * ny * ny
             hessian[1, 2] += weight * ny * turn
             hessian[2, 2] += weight * turn * turn
-        hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
+            # What the line's error of direction adds of nothing.
+            along = nx * rx + ny * ry
+            weight *= turns[found]
+            imagined[0, 0] += weight * ny * ny
+            imagined[0, 1] -= weight * nx * ny
+            imagined[0, 2] += weight * ny * along
+            imagined[1, 1] += weight * nx * nx
+            imagined[1, 2] -= weight * nx * along
+            imagined[2, 2] += weight * along * along
+        for each in (hessian, imagined):
+            each[1, 0], each[2, 0], each[2, 1] = each[0, 1], each[0, 2], each[1, 2]
         share = near / max(expected, 1)
         if near < 10:
             return 0.0
         # Along a corridor nothing pulls; odometry, or another scan, knows better.
         move = np.linalg.solve(hessian + 1e-3 * np.trace(hessian) / 3.0 * np.eye(3), -gradient)
         pose += move
-        if math.hypot(move[0], move[1]) < 1e-4 and abs(move[2]) < 1e-5:
+        if math.hypot(move[0], move[1]) < 5e-4 and abs(move[2]) < 5e-5:
             break
     return share

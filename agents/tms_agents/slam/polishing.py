@@ -2,7 +2,8 @@
 
 A grid of 5 cm cells keeps a filter within 2 to 4 cm; scans agree with one another within millimetres. Each scan is
 matched with those just before it and with some that saw the same place at other times; a sparse pose graph joins all
-of it (Lu and Milios 1997). What moved between the two scans is an outlier of a robust kernel.
+of it (Lu and Milios 1997). What moved between the two scans is an outlier of a robust kernel. Where scans do not tell
+how far the robot went, odometry does, whose metre is measured where they do.
 """
 
 from __future__ import annotations
@@ -15,16 +16,17 @@ from scipy.spatial import cKDTree
 
 from tms_agents.slam.geometry import Floats, between, compose
 from tms_agents.slam.keyframes import Indices, poses_of_all, spaced
-from tms_agents.slam.lines import Lines, lines_of, match_lines
+from tms_agents.slam.lines import Lines, lines_of, match_lines, without
 from tms_agents.slam.logs import Log
 from tms_agents.slam.motion import OdometryNoise
 from tms_agents.slam.posegraph import Edges, joined, optimise
+from tms_agents.slam.wheels import Wheels, wheels_of
 
 #: Scans that are matched: one every so much (m, rad).
 _STEP_M, _STEP_RAD = 0.1, 0.08
 #: Each with those so many before it, and with at most so many of other times whose views have their middles, so far
 #: ahead of the robot, near each other (m).
-_BEFORE, _OTHERS = (1, 2, 4), 4
+_BEFORE, _OTHERS = (1, 2, 4, 8), 4
 _AHEAD_M, _NEAR_M, _LONG_AGO = 2.0, 1.2, 12
 #: Steps of the reader of distances: how far lines are looked for (m), round by round.
 _REACHES_M = (0.25, 0.12, 0.08)
@@ -56,14 +58,16 @@ def polish(
     static = lines if movable is None else [_static(one, int(k), movable) for one, k in zip(lines, keys, strict=True)]
     legs = legs_of(log.t)[keys]
     match = Matcher(lines, static, legs, movable is not None)
-    chain = joined(_odometry(log, keys, noise), match.steps(path, log.odometry[keys]))
+    steps = match.steps(path, log.odometry[keys])
+    odometry = _odometry(log, keys, wheels_of(steps, log.odometry[keys], noise))
     if movable is not None:
         # Each time by itself at first: what was moved lets go of the path.
-        path = optimise(path, chain, match.revisits(path, _REACHES_M[0], within_legs=True))
+        within_legs = match.revisits(path, _REACHES_M[0], within_legs=True)
+        path = optimise(path, odometry, joined(steps, within_legs))
     for reach in _REACHES_M if movable is None else (*_WIDELY_M, *_REACHES_M):
-        loops = match.revisits(path, reach)
+        matches = joined(steps, match.revisits(path, reach))
         # Torn far at first, all pull with full weight; who is alone against the others lets go then.
-        path = optimise(path, chain, loops, np.inf if reach in _WIDELY_M else _SWITCH)
+        path = optimise(path, odometry, matches, np.inf if reach in _WIDELY_M else _SWITCH)
     return poses_of_all(log, keys, path)
 
 
@@ -80,12 +84,12 @@ def _static(lines: Lines, n: int, movable: Callable[[int, Floats], NDArray[np.bo
     return lines.without(gone)
 
 
-def _odometry(log: Log, keys: Indices, noise: OdometryNoise) -> Edges:
+def _odometry(log: Log, keys: Indices, wheels: Wheels) -> Edges:
     motions = between(log.odometry[keys[:-1]], log.odometry[keys[1:]])
-    covariance = noise.covariance(motions, np.diff(log.driven[keys], axis=0))
+    covariance = wheels.noise.covariance(motions, np.diff(log.driven[keys], axis=0))
     numbers = np.arange(len(keys))
     information: Floats = np.linalg.inv(covariance).astype(np.float64)
-    return Edges(numbers[:-1], numbers[1:], motions, information)
+    return Edges(numbers[:-1], numbers[1:], wheels.driven(motions), information)
 
 
 class Matcher:
@@ -156,6 +160,4 @@ def _without_slide(hessian: Floats, below: float) -> Floats:
     values, vectors = np.linalg.eigh(hessian[:2, :2])
     if values[0] > below * values[1] or values[0] < 1.0:
         return hessian
-    told = hessian @ np.array([*vectors[:, 0], 0.0])
-    left: Floats = hessian - np.outer(told, told) / values[0]
-    return left
+    return without(hessian, np.array([*vectors[:, 0], 0.0]))

@@ -106,5 +106,5 @@ def _step(poses: Floats, edges: Edges, scale: Floats) -> Floats:
         ),
         shape=(size, size),
     ).tocsc()
-    found: Floats = -spsolve(matrix, gradient.ravel()).reshape(-1, 3)
+    found: Floats = -spsolve(matrix, gradient.ravel(), permc_spec="MMD_AT_PLUS_A").reshape(-1, 3)
     return found

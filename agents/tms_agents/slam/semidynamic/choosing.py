@@ -71,6 +71,14 @@ def choose(tracks: Mapping[str, Track], random: np.random.Generator) -> None:
         track.chosen = found[tag]
 
 
+def complete(tracks: Mapping[str, Track]) -> None:
+    """Sets ``chosen`` of those tracks that have none yet, given the others."""
+    at_once = _at_once(tracks)
+    missing = [tag for tag, track in sorted(tracks.items()) if track.chosen is None]
+    for tag in missing * 2:
+        _solve(tracks[tag], tracks, at_once)
+
+
 def _improve(tracks: Mapping[str, Track], at_once: _Shared) -> None:
     """One by one, then pairs in both orders, while that is better."""
     for _ in range(_SWEEPS):

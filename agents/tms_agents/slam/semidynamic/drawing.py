@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats, transform
 from tms_agents.slam.gridmap import GridMap, grid_map, render
 from tms_agents.slam.keyframes import key_scans
 from tms_agents.slam.logs import Log
 from tms_agents.slam.occupancy import HIGHEST
-from tms_agents.slam.polishing import legs_of
 from tms_agents.slam.semidynamic.evidence import CELL_M, Place, count_beams
 from tms_agents.slam.semidynamic.models import Models
 from tms_agents.slam.semidynamic.outlines import Outlines
@@ -34,13 +32,13 @@ _SEEN_THROUGH, _ENOUGH = 0.5, 4
 def draw(log: Log, poses: Floats, stays: Mapping[str, Sequence[Stay]], models: Models, resolution: float) -> GridMap:
     """Cells of ``resolution`` m, with the objects where they stood last."""
     scans = key_scans(log, _STEP_M, _STEP_RAD)
-    legs, outlines = legs_of(log.t), Outlines(log.t, stays, models)
+    outlines = Outlines(log.t, stays, models)
     points = [_static(log, poses, int(n), outlines) for n in scans]
     grid = grid_map(render(poses[scans], points, log.laser[:2], resolution, _REACH_M), 0)
     cells = grid.cells.copy()
     for tag, found in stays.items():
         outline = surface(models.objects[tag], found[-1].pose)
-        if _gone(log, poses, legs, found[-1], outline):
+        if found[-1].left or _gone(log, poses, found[-1], outline):
             continue
         at = np.floor((outline - np.array(grid.origin)) / resolution).astype(int)
         inside = ((at >= 0) & (at < np.array(cells.shape[::-1]))).all(axis=1)
@@ -55,9 +53,9 @@ def _static(log: Log, poses: Floats, n: int, outlines: Outlines) -> Floats:
     return kept
 
 
-def _gone(log: Log, poses: Floats, legs: NDArray[np.int64], last: Stay, outline: Floats) -> bool:
-    """Whether beams of later legs went through where it was seen last; what is hidden is still there."""
-    later = np.flatnonzero(legs > last.visit.leg)
+def _gone(log: Log, poses: Floats, last: Stay, outline: Floats) -> bool:
+    """Whether beams went later through where it was seen last; what is hidden is still there."""
+    later = np.flatnonzero(log.t > last.visit.ends)
     if not len(later):
         return False
     place = Place.around(outline, 0.1)

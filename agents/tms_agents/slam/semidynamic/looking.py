@@ -23,7 +23,8 @@ _OTHERS = 500
 def sight_of(visit: Visit, log: Log, poses: Floats, rounds: Rounds, round_poses: Floats, models: Models) -> Sight:
     """``poses`` (S, 3) of the robot at the scans of ``log``, ``round_poses`` (R, 3) at ``rounds``."""
     read = rounds.read(visit.tag)
-    place = Place.around(round_poses[visit.rounds][read[visit.rounds]], _AROUND_M)
+    read_from = round_poses[visit.rounds][read[visit.rounds]]
+    place = Place.around(read_from if visit.reads else visit.middle[None], _AROUND_M)
     now = count_beams(place, log, poses, visit.scans)
     near = place.distance(poses[:, :2]) < log.range_max
     near[visit.scans] = False

@@ -38,6 +38,10 @@ class Sight:
     cells: Worth
     heard: Sequence[Heard]
 
+    @property
+    def was_read(self) -> bool:
+        return any(one.read and len(one.poses) for one in self.heard)
+
     def score(self, model: ObjectModel, shape: Shape, poses: Floats) -> Floats:
         """Log-likelihood (N,) of poses (N, 3), up to a constant."""
         return self.seen(shape, poses) + self.read(model, poses)
@@ -50,6 +54,8 @@ class Sight:
             poses, shape.outline, shape.normals, shape.beyond, shape.inside, shape.hinged, cells.seen, cells.always,
             cells.towards, cells.through, cells.inside, cells.wall, cells.surface, self.place.corner, CELL_M, found,
         )  # fmt: skip
+        if not self.was_read:
+            return found
         return found + _UNSEEN * np.clip(1 - found / _SEEN_ENOUGH, 0, 1)
 
     def read(self, model: ObjectModel, poses: Floats) -> Floats:

@@ -1,11 +1,13 @@
 """Visits: spans of time in which a tag was read and its object stood still.
 
 Nobody moves things under the robot's eyes (``slam-sd`` section 1): they move while it is parked or far away. So a visit
-ends when the robot parks, or has been out of sight of the place, and is all the time that it was near.
+ends when the robot parks, or has been out of sight of the place, and is all the time that it was near. Where the robot
+passed and read nothing, that was a visit, too: a quiet one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +24,8 @@ _AWAY_M, _NEAR_M = 9.0, 6.0
 @dataclass(frozen=True, slots=True, eq=False)
 class Visit:
     """``rounds`` (indices of tag rounds) and ``scans`` (indices) from the time of the visit; ``middle`` (2,) m of
-    where the robot was when it read; ``leg``: how often the robot was parked before."""
+    where the robot was when it read (quiet: does at other times); ``leg``: how often the robot was parked before;
+    ``ends``: when it had been away (s)."""
 
     tag: str
     rounds: NDArray[np.int64]
@@ -30,6 +33,7 @@ class Visit:
     middle: Floats
     reads: int
     leg: int
+    ends: float = np.inf
 
 
 def visits_of(tag: str, rounds: Rounds, round_poses: Floats, scan_t: Floats, scan_poses: Floats) -> list[Visit]:
@@ -37,48 +41,58 @@ def visits_of(tag: str, rounds: Rounds, round_poses: Floats, scan_t: Floats, sca
     numbers = np.flatnonzero(rounds.read(tag))
     if not len(numbers):
         return []
-    times = np.concatenate([rounds.t, scan_t])
-    order = np.argsort(times, kind="stable")
-    pass_of = np.empty(len(times), dtype=np.int64)
-    pass_of[order] = legs_of(times[order])
-    round_pass, scan_pass = pass_of[: len(rounds.t)], pass_of[len(rounds.t) :]
+    track = _Track(rounds.t, round_poses, scan_t, scan_poses)
     groups: list[list[int]] = [[int(numbers[0])]]
     for number in numbers[1:]:
         last = groups[-1]
         middle = np.median(round_poses[last, :2], axis=0)
         between = round_poses[last[-1] : number + 1, :2]
         away = float(np.hypot(*(between - middle).T).max())
-        if round_pass[number] != round_pass[last[0]] or away > _AWAY_M:
+        if track.round_leg[number] != track.round_leg[last[0]] or away > _AWAY_M:
             groups.append([])
         groups[-1].append(int(number))
-    return [_visit(tag, group, round_pass, rounds.t, round_poses, scan_pass, scan_t, scan_poses) for group in groups]
+    return [track.visit(tag, group, np.median(round_poses[group, :2], axis=0), len(group)) for group in groups]
 
 
-def _visit(
-    tag: str,
-    group: list[int],
-    round_pass: NDArray[np.int64],
-    round_t: Floats,
-    round_poses: Floats,
-    scan_pass: NDArray[np.int64],
-    scan_t: Floats,
-    scan_poses: Floats,
-) -> Visit:
-    middle = np.median(round_poses[group, :2], axis=0)
-    first, last = round_t[group[0]], round_t[group[-1]]
+def quiet_visits(
+    visits: Sequence[Visit], rounds: Rounds, round_poses: Floats, scan_t: Floats, scan_poses: Floats
+) -> list[Visit]:
+    """Those at other times than ``visits`` of one tag, whose thing turns but stays in its place."""
+    track = _Track(rounds.t, round_poses, scan_t, scan_poses)
+    middle = np.mean([visit.middle for visit in visits], axis=0)
+    near = np.flatnonzero(np.hypot(*(round_poses[:, :2] - middle).T) < _NEAR_M)
+    met, scans = (np.concatenate([getattr(visit, name) for visit in visits]) for name in ("rounds", "scans"))
+    found = []
+    while len(near := np.setdiff1d(near, met)):
+        quiet = track.visit(visits[0].tag, [int(near[0])], middle, 0)
+        met = np.concatenate([near[:1], quiet.rounds])
+        if len(quiet.scans) and not len(np.intersect1d(quiet.scans, scans)):
+            found.append(quiet)
+    return found
 
-    def kept(t: Floats, poses: Floats, passes: NDArray[np.int64]) -> NDArray[np.int64]:
-        apart = np.hypot(*(poses[:, :2] - middle).T)
-        away = (apart > _AWAY_M) | (passes != round_pass[group[0]])
-        begins = t[away & (t < first)].max(initial=-np.inf)
-        ends = t[away & (t > last)].min(initial=np.inf)
-        return np.flatnonzero((t > begins) & (t < ends) & (apart < _NEAR_M))
 
-    return Visit(
-        tag,
-        kept(round_t, round_poses, round_pass),
-        kept(scan_t, scan_poses, scan_pass),
-        middle,
-        len(group),
-        int(round_pass[group[0]]),
-    )
+class _Track:
+    """Where the robot was, at ``round_t`` (R,) and ``scan_t`` (S,), and in which leg."""
+
+    def __init__(self, round_t: Floats, round_poses: Floats, scan_t: Floats, scan_poses: Floats) -> None:
+        times = np.concatenate([round_t, scan_t])
+        order = np.argsort(times, kind="stable")
+        legs = np.empty(len(times), dtype=np.int64)
+        legs[order] = legs_of(times[order])
+        self.round_leg, self.scan_leg = legs[: len(round_t)], legs[len(round_t) :]
+        self._round_t, self._round_poses, self._scan_t, self._scan_poses = round_t, round_poses, scan_t, scan_poses
+
+    def visit(self, tag: str, group: list[int], middle: Floats, reads: int) -> Visit:
+        """Around ``middle`` (2,) at the time of a ``group`` of rounds."""
+        first, last, leg = self._round_t[group[0]], self._round_t[group[-1]], self.round_leg[group[0]]
+
+        def kept(t: Floats, poses: Floats, legs: NDArray[np.int64]) -> tuple[NDArray[np.int64], float]:
+            apart = np.hypot(*(poses[:, :2] - middle).T)
+            away = (apart > _AWAY_M) | (legs != leg)
+            begins = t[away & (t < first)].max(initial=-np.inf)
+            ends = t[away & (t > last)].min(initial=np.inf)
+            return np.flatnonzero((t > begins) & (t < ends) & (apart < _NEAR_M)), float(ends)
+
+        rounds, _ = kept(self._round_t, self._round_poses, self.round_leg)
+        scans, ends = kept(self._scan_t, self._scan_poses, self.scan_leg)
+        return Visit(tag, rounds, scans, middle, reads, int(leg), ends)
