@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 #: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
-UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT = 0, 1, 2, 3, 4, 5
+#: Half hidden, and seen past where the rest of it was met.
+UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT, PAST = 0, 1, 2, 3, 4, 5, 6
 
 #: What echoes less often is black or glossy.
 QUIET = 0.9
@@ -97,6 +98,13 @@ def _cut(ranges: Array, a: int, b: int) -> bool:
 
 
 @njit(cache=True)
+def _past(ranges: Array, states: NDArray[np.int8], at: float, behind: float) -> bool:
+    """Whether the beam (fraction) ``at`` ends farther off than ``behind`` m."""
+    i = int(np.round(at))
+    return bool(0 <= i < ranges.size and states[i] != NO_ECHO and ranges[i] > behind)
+
+
+@njit(cache=True)
 def look(
     things: Any,
     ranges: Array,
@@ -109,6 +117,7 @@ def look(
     first: float,
     step: float,
     claimed: NDArray[np.bool_],
+    sensor: int,
     looks: Any,
 ) -> None:
     """What one scan says of each thing, into ``looks``; its beams are marked in ``claimed`` (n,).
@@ -201,6 +210,8 @@ def look(
                 out.n = hits
                 out.spacing = away * abs(step)
                 out.width = (b - a + 1) * out.spacing
+                if v == 0:
+                    thing.part, thing.part_by = (0.5 * (a + b) - middle) * out.spacing, sensor
                 quiet = thing.rate < QUIET
                 # Of what is black or glossy a scan shows a part: how wide it is has been seen in others.
                 wide = max(out.width, 2.0 * thing.half) if quiet else out.width
@@ -213,6 +224,8 @@ def look(
                 # By way of a mirror places are less exact: what hides a thing directly says more.
                 if v == 0 or out.verdict == UNSEEN:
                     out.verdict = FREE
+            elif v == 0 and thing.part_by == sensor and _past(ranges, states, middle + thing.part / (away * abs(step)), away + gate):
+                out.verdict = PAST
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
             elif out.verdict == UNSEEN and (beyond == 0 or mute > 0):
