@@ -43,8 +43,8 @@ _MUTES, _SELDOM = 10, 0.06
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
 #: The same of somebody of whom one thing alone was seen that did not move.
 _NOWHERE_S = 8.0
-#: No foot looks narrower (m).
-_FOOT_M = 0.06
+#: No foot looks narrower (m); as wide as this (m) is a shoe from its side.
+_FOOT_M, _SHOE_M = 0.06, 0.2
 #: Whoever is there, what is so broad (m) is furniture, where there are no robots.
 _BROAD_M = 0.45
 #: Robots stand for so long (s); what stands behind something is seen in part in this share of its sightings.
@@ -119,7 +119,7 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
 
 @njit(cache=True)
 def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float) -> bool:
-    """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, or there are two.
+    """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, wide, or there are two.
 
     Where there are ``robots``, what stands behind something new, and is never seen whole, may be a part of one.
     """
@@ -129,6 +129,8 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
         return True
     if t - q.first > _STANDS_S:
         return False
+    if q.width > _SHOE_M and (t - q.first < _PART_S or q.owned >= q.first):
+        return True
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
