@@ -144,6 +144,7 @@ def look(
             low = max(0, int(np.ceil(middle - half_angle - 1.0)))
             high = min(n - 1, int(np.floor(middle + half_angle + 1.0)))
             inner = max(0.5, 0.75 * half_angle)
+            part = middle + thing.part / (away * abs(step))
             hits, beyond, hidden, total, alien, mute = 0, 0, 0, 0, 0, 0
             x, y = 0.0, 0.0
             a, b = -1, -1
@@ -224,7 +225,7 @@ def look(
                 # By way of a mirror places are less exact: what hides a thing directly says more.
                 if v == 0 or out.verdict == UNSEEN:
                     out.verdict = FREE
-            elif v == 0 and thing.part_by == sensor and _past(ranges, states, middle + thing.part / (away * abs(step)), away + gate):
+            elif v == 0 and thing.part_by == sensor and _past(ranges, states, part, away + gate):
                 out.verdict = PAST
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN

@@ -150,8 +150,8 @@ BODY = np.dtype(
     ]
 )
 
-#: An object: place (m) and its variance (m²), half its width, times, for how long its place was seen to be free, and how far
-#: aside (m, along the beams) of its middle, by which sensor, it was met last.
+#: An object: place (m) and its variance (m²), half its width, times, for how long its place was seen to be free, and
+#: how far aside of its middle (m, along the beams), by which sensor, it was met last.
 THING = np.dtype(
     [
         ("used", "i8"),
