@@ -30,6 +30,9 @@ _SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
 #: Beams that tell a shape; a face slants if its ends are so differently far (share of the width); two faces stand out
 #: before the line between their ends by so much (mean, share of its length).
 _PROFILE, _SLANT, _CORNER = 6, 0.13, 0.25
+#: What is seen of a half hidden thing is known when the same of it has been met so often, and so many times more often
+#: than passed; how fast it follows; of what echoes less often it is not.
+_STEADY, _SELDOM, _PART, _ECHOES = 30, 3, 0.2, 0.8
 #: So many beams beside a thing do not show the background alone.
 _GUARD = 2
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
@@ -144,6 +147,7 @@ def look(
             low = max(0, int(np.ceil(middle - half_angle - 1.0)))
             high = min(n - 1, int(np.floor(middle + half_angle + 1.0)))
             inner = max(0.5, 0.75 * half_angle)
+            shows = thing.part_by == sensor and thing.part_hits >= _STEADY and thing.rate > _ECHOES
             part = middle + thing.part / (away * abs(step))
             hits, beyond, hidden, total, alien, mute = 0, 0, 0, 0, 0, 0
             x, y = 0.0, 0.0
@@ -211,8 +215,12 @@ def look(
                 out.n = hits
                 out.spacing = away * abs(step)
                 out.width = (b - a + 1) * out.spacing
-                if v == 0:
-                    thing.part, thing.part_by = (0.5 * (a + b) - middle) * out.spacing, sensor
+                if v == 0 and hidden > 0:
+                    aside = (0.5 * (a + b) - middle) * out.spacing
+                    if thing.part_by != sensor or abs(aside - thing.part) > out.spacing:
+                        thing.part, thing.part_by, thing.part_hits = aside, sensor, 0
+                    thing.part += _PART * (aside - thing.part)
+                    thing.part_hits = min(thing.part_hits + 1, 2 * _STEADY)
                 quiet = thing.rate < QUIET
                 # Of what is black or glossy a scan shows a part: how wide it is has been seen in others.
                 wide = max(out.width, 2.0 * thing.half) if quiet else out.width
@@ -225,8 +233,9 @@ def look(
                 # By way of a mirror places are less exact: what hides a thing directly says more.
                 if v == 0 or out.verdict == UNSEEN:
                     out.verdict = FREE
-            elif v == 0 and thing.part_by == sensor and _past(ranges, states, part, away + gate):
+            elif v == 0 and shows and _past(ranges, states, part, away + gate):
                 out.verdict = PAST
+                thing.part_hits -= _SELDOM
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
             elif out.verdict == UNSEEN and (beyond == 0 or mute > 0):

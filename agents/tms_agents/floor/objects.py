@@ -295,7 +295,7 @@ class Objects:
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
         thing["since"], thing["seen"], thing["free_at"] = print_["rested"], t, t
-        thing["free"], thing["doubt"], thing["part"], thing["part_by"] = 0.0, 0.0, 0.0, -1
+        thing["free"], thing["doubt"], thing["part"], thing["part_by"], thing["part_hits"] = 0.0, 0.0, 0.0, -1, 0
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
         thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))

@@ -34,8 +34,6 @@ _STILL_M, _STILL = 0.008, 0.001
 NEAR_M = 0.36
 #: Seen so often, a shoe is not so thin (m), a leg not so much thinner or wider than it was.
 _OFTEN, _SHOE_M, _LEG = 10, 0.07, (0.65, 1.6)
-#: What is wider on the average (m) is a shoe, which looks narrow from its tip.
-_LEG_M = 0.15
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
 
@@ -171,7 +169,7 @@ def unlike_foot(body: Any, q: Any) -> bool:
         return False
     if body.shoe >= SHOES:
         return bool(q.width < _SHOE_M)
-    return bool(0.0 < body.leg < _LEG_M and not _LEG[0] < q.width / body.leg < _LEG[1])
+    return bool(body.leg > 0.0 and not _LEG[0] < q.width / body.leg < _LEG[1])
 
 
 @njit(cache=True)

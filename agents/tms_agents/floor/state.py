@@ -151,7 +151,7 @@ BODY = np.dtype(
 )
 
 #: An object: place (m) and its variance (m²), half its width, times, for how long its place was seen to be free, and
-#: how far aside of its middle (m, along the beams), by which sensor, it was met last.
+#: how far aside of its middle (m, along the beams), by which sensor and how often, it is met while half hidden.
 THING = np.dtype(
     [
         ("used", "i8"),
@@ -170,6 +170,7 @@ THING = np.dtype(
         ("solid", "f8"),
         ("part", "f8"),
         ("part_by", "i8"),
+        ("part_hits", "i8"),
     ]
 )
 
