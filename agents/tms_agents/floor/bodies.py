@@ -12,7 +12,7 @@ from tms_agents.floor.gait import foot, middle, shod, swap
 #: Acceleration noise (m²/s³) and how fast the memory of a velocity fades while nothing is seen (s).
 _ACCELERATION, _COAST_S = 1.5, 2.0
 #: A foot stays where it stands within this (m); nobody is faster (m/s); no step is longer (m).
-STAND_M, _FAST, _LONGEST_M = 0.045, 2.0, 1.4
+STAND_M, _FAST, LONGEST_M = 0.045, 2.0, 1.4
 #: No ankle or shoe is narrower than this (m).
 _FOOT_M = 0.05
 #: Wider than two feet side by side (m): a robot or furniture.
@@ -138,7 +138,7 @@ def update(
     t: float,
 ) -> None:
     """The body was seen: its first foot is the cluster c, its second d, each where there is one; or ``one`` is both."""
-    if has_c and has_d and np.hypot(c.x - d.x, c.y - d.y) > _LONGEST_M:
+    if has_c and has_d and np.hypot(c.x - d.x, c.y - d.y) > LONGEST_M:
         # No step is so long: the foot that stood for longer is something else.
         if prints[c_print].first < prints[d_print].first:
             has_c = False

@@ -33,8 +33,8 @@ _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
 #: In a door somebody may wait for so long (s).
 _WAITS_S = 25.0
-#: Of saved states; 4: how wide legs are, and since when prints have been nobody's.
-_FORMAT = 4
+#: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
+_FORMAT = 5
 
 
 class FloorEstimator:
@@ -115,6 +115,7 @@ class FloorEstimator:
             view.first,
             view.step,
             view.claimed,
+            view.index,
             self._looks,
         )
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
@@ -161,7 +162,8 @@ class FloorEstimator:
         x, y = float(q["x"]), float(q["y"])
         if self._masks.outside(x, y) or (kind == OBJECT and self._objects.at(q)):
             return []
-        if kind == OBJECT and not q["given"] and t - q["first"] < _WAITS_S and self._gates.distance(x, y) == 0.0:
+        waits = kind == OBJECT and not q["given"] and t - q["first"] < _WAITS_S and self._gates.distance(x, y) == 0.0
+        if waits and not self._tracks.elsewhere(int(q["whose"]), x, y, t):
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s

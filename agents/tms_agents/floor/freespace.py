@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 #: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
-UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT = 0, 1, 2, 3, 4, 5
+#: Half hidden, and seen past where the rest of it was met.
+UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT, PAST = 0, 1, 2, 3, 4, 5, 6
 
 #: What echoes less often is black or glossy.
 QUIET = 0.9
@@ -29,6 +30,9 @@ _SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
 #: Beams that tell a shape; a face slants if its ends are so differently far (share of the width); two faces stand out
 #: before the line between their ends by so much (mean, share of its length).
 _PROFILE, _SLANT, _CORNER = 6, 0.13, 0.25
+#: What is seen of a half hidden thing is known when the same of it has been met so often, and so many times more often
+#: than passed; how fast it follows; of what echoes less often it is not.
+_STEADY, _SELDOM, _PART, _ECHOES = 30, 3, 0.2, 0.8
 #: So many beams beside a thing do not show the background alone.
 _GUARD = 2
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
@@ -97,6 +101,13 @@ def _cut(ranges: Array, a: int, b: int) -> bool:
 
 
 @njit(cache=True)
+def _past(ranges: Array, states: NDArray[np.int8], at: float, behind: float) -> bool:
+    """Whether the beam (fraction) ``at`` ends farther off than ``behind`` m."""
+    i = int(np.round(at))
+    return bool(0 <= i < ranges.size and states[i] != NO_ECHO and ranges[i] > behind)
+
+
+@njit(cache=True)
 def look(
     things: Any,
     ranges: Array,
@@ -109,6 +120,7 @@ def look(
     first: float,
     step: float,
     claimed: NDArray[np.bool_],
+    sensor: int,
     looks: Any,
 ) -> None:
     """What one scan says of each thing, into ``looks``; its beams are marked in ``claimed`` (n,).
@@ -135,6 +147,8 @@ def look(
             low = max(0, int(np.ceil(middle - half_angle - 1.0)))
             high = min(n - 1, int(np.floor(middle + half_angle + 1.0)))
             inner = max(0.5, 0.75 * half_angle)
+            shows = thing.part_by == sensor and thing.part_hits >= _STEADY and thing.rate > _ECHOES
+            part = middle + thing.part / (away * abs(step))
             hits, beyond, hidden, total, alien, mute = 0, 0, 0, 0, 0, 0
             x, y = 0.0, 0.0
             a, b = -1, -1
@@ -201,6 +215,12 @@ def look(
                 out.n = hits
                 out.spacing = away * abs(step)
                 out.width = (b - a + 1) * out.spacing
+                if v == 0 and hidden > 0:
+                    aside = (0.5 * (a + b) - middle) * out.spacing
+                    if thing.part_by != sensor or abs(aside - thing.part) > out.spacing:
+                        thing.part, thing.part_by, thing.part_hits = aside, sensor, 0
+                    thing.part += _PART * (aside - thing.part)
+                    thing.part_hits = min(thing.part_hits + 1, 2 * _STEADY)
                 quiet = thing.rate < QUIET
                 # Of what is black or glossy a scan shows a part: how wide it is has been seen in others.
                 wide = max(out.width, 2.0 * thing.half) if quiet else out.width
@@ -213,6 +233,9 @@ def look(
                 # By way of a mirror places are less exact: what hides a thing directly says more.
                 if v == 0 or out.verdict == UNSEEN:
                     out.verdict = FREE
+            elif v == 0 and shows and _past(ranges, states, part, away + gate):
+                out.verdict = PAST
+                thing.part_hits -= _SELDOM
             elif out.verdict == UNSEEN and hidden > 0:
                 out.verdict = HIDDEN
             elif out.verdict == UNSEEN and (beyond == 0 or mute > 0):

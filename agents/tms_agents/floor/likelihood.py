@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.bodies import STAND_M, WIDE_M, narrow, together
+from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, together
 from tms_agents.floor.gait import SHOES
 from tms_agents.floor.shine import unlike
 
@@ -85,6 +85,12 @@ def waits(body: Any, c: Any) -> bool:
 
 
 @njit(cache=True)
+def _strides(body: Any, c: Any) -> float:
+    """How far (m) the nearer foot of the body would have to step to the cluster."""
+    return float(min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by)))
+
+
+@njit(cache=True)
 def costs(
     clusters: Any,
     of: NDArray[np.int64],
@@ -127,6 +133,8 @@ def costs(
             if body.stale and age > _FRESH_S and not waits(body, c):
                 continue
             if not body.confirmed and age > t - body.first + 0.25:
+                continue
+            if not body.confirmed and _strides(body, c) > LONGEST_M:
                 continue
             if away > _REACH_M + 1.5 * np.sqrt(body.pp):
                 continue

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
-from tms_agents.floor.freespace import FREE, HIDDEN, HIT, QUIET, SILENT
+from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 OBJECT, FURNITURE = 1, 2
 #: How near who acts is (m, Gaussian), and who is too far to have acted.
 _ARM_M, _FAR_M = 0.5, 1.6
-#: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other).
-_SURE, _PER_SCAN = 7.5, 1.5
+#: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other), and per
+#: scan that sees past the edge of what hides the thing.
+_SURE, _PER_SCAN, _PER_GLIMPSE = 7.5, 1.5, 1.0
 #: While it is hidden, looks past the edge of what hides it (mixed pixels) are forgotten in this time (s).
 _FORGET_S = 2.0
 #: Things overlap if they are nearer than this share of their half widths (and m).
@@ -42,8 +43,8 @@ _MUTES, _SELDOM = 10, 0.06
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
 #: The same of somebody of whom one thing alone was seen that did not move.
 _NOWHERE_S = 8.0
-#: No foot looks narrower (m).
-_FOOT_M = 0.06
+#: No foot looks narrower (m); as wide as this (m) is a shoe from its side.
+_FOOT_M, _SHOE_M = 0.06, 0.2
 #: Whoever is there, what is so broad (m) is furniture, where there are no robots.
 _BROAD_M = 0.45
 #: Robots stand for so long (s); what stands behind something is seen in part in this share of its sightings.
@@ -97,10 +98,11 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
             thing.rate -= 0.02 * thing.rate
             thing.solid += 0.02 * (1.0 - thing.solid)
             thing.doubt = max(0.0, thing.doubt - _PER_SCAN)
-        elif seen.verdict == FREE:
+        elif seen.verdict == FREE or seen.verdict == PAST:
             # Since the last look by any sensor, but no longer than a scan takes: between them it was hidden.
             thing.free += min(dt, t - thing.free_at, 0.2)
-            thing.doubt += min(_PER_SCAN, -np.log(max(1.0 - thing.solid, 1e-3)))
+            most = _PER_SCAN if seen.verdict == FREE else _PER_GLIMPSE
+            thing.doubt += min(most, -np.log(max(1.0 - thing.solid, 1e-3)))
             if thing.doubt < 4.0:
                 thing.rate -= 0.02 * thing.rate
                 thing.solid -= 0.02 * thing.solid
@@ -108,7 +110,7 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
             fade = np.exp(-dt / _FORGET_S)
             thing.free *= fade
             thing.doubt *= fade
-        if seen.verdict == HIT or seen.verdict == FREE:
+        if seen.verdict == HIT or seen.verdict == FREE or seen.verdict == PAST:
             thing.free_at = t
         if thing.free > 0.0:
             waiting += 1
@@ -117,14 +119,18 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
 
 @njit(cache=True)
 def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float) -> bool:
-    """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, or there are two.
+    """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, wide, or there are two.
 
     Where there are ``robots``, what stands behind something new, and is never seen whole, may be a part of one.
     """
+    if q.given:
+        return False
     if robots and q.covered > _COVERED * q.hits and t - q.first < _PARKS_S:
         return True
-    if t - q.first > _STANDS_S or q.given:
+    if t - q.first > _STANDS_S:
         return False
+    if q.width > _SHOE_M and (t - q.first < _PART_S or q.owned >= q.first):
+        return True
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
@@ -289,7 +295,7 @@ class Objects:
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
         thing["since"], thing["seen"], thing["free_at"] = print_["rested"], t, t
-        thing["free"], thing["doubt"] = 0.0, 0.0
+        thing["free"], thing["doubt"], thing["part"], thing["part_by"], thing["part_hits"] = 0.0, 0.0, 0.0, -1, 0
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
         thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))

@@ -107,7 +107,7 @@ def follow(
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
             q.attached = c.attached
-            q.owner, q.owned, q.busy, q.revealed, q.given, q.idle = -1, -1e9, -1e9, 0, 0, 0.0
+            q.owner, q.whose, q.owned, q.busy, q.revealed, q.given, q.idle = -1, -1, -1e9, -1e9, 0, 0, 0.0
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
@@ -212,7 +212,7 @@ def attend(prints: Any, bodies: Any, t: float, dt: float) -> None:
                     q.busy = t
                 continue
             if body.a_print == j or body.b_print == j:
-                q.owner = b
+                q.owner, q.whose = b, body.label
                 q.owned = t
                 q.busy = t
             if body.stale:

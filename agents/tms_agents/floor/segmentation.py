@@ -40,6 +40,8 @@ _EDGE_M, _HIDDEN_M, _BRIDGE = 0.08, 0.15, 40
 _SAME_M, _SAME = 0.06, 0.25
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
 _SMOOTH_M, _SMOOTH_PER_M = 0.006, 0.002
+#: What is so little (m) before the background may be taken for it.
+_BEFORE_M = 0.1
 
 
 @njit(cache=True)
@@ -53,15 +55,20 @@ def _flickers(ranges: Array, i: int) -> bool:
 
 
 @njit(cache=True)
-def _goes_on(ranges: Array, beside: int, edge: int, end: int) -> bool:
-    """Whether the surface seen from beam ``edge`` to ``end`` goes on in the beam ``beside`` it."""
-    slope = 0.0
+def _goes_on(ranges: Array, longest: Array, beside: int, edge: int, end: int) -> bool:
+    """Whether the surface seen from beam ``edge`` to ``end`` goes on in the beam ``beside`` it.
+
+    Of what lies right before a wall all beams but one may pass for the wall: it goes on where the wall is, not there.
+    """
+    slope, r = 0.0, ranges[beside]
+    if edge == end and abs(longest[beside] - r) < _BEFORE_M:
+        r = longest[beside]
     if edge != end:
         inner = edge + (1 if end > edge else -1)
         slope = ranges[edge] - ranges[inner]
         if np.isnan(slope) or abs(slope) > 0.03:
             slope = 0.0
-    return bool(abs(ranges[beside] - ranges[edge] - slope) < _SMOOTH_M + _SMOOTH_PER_M * ranges[edge])
+    return bool(abs(r - ranges[edge] - slope) < _SMOOTH_M + _SMOOTH_PER_M * ranges[edge])
 
 
 @njit(cache=True)
@@ -139,9 +146,9 @@ def _segment(
         c.spacing = c.near * step[min(a, n - 1)]
         c.width = np.hypot(ax - bx, ay - by) + c.spacing
         c.attached = 0
-        if a > 0 and (states[a - 1] == BACKGROUND or claimed[a - 1]) and _goes_on(ranges, a - 1, a, b):
+        if a > 0 and (states[a - 1] == BACKGROUND or claimed[a - 1]) and _goes_on(ranges, longest, a - 1, a, b):
             c.attached = 1
-        if b < n - 1 and (states[b + 1] == BACKGROUND or claimed[b + 1]) and _goes_on(ranges, b + 1, b, a):
+        if b < n - 1 and (states[b + 1] == BACKGROUND or claimed[b + 1]) and _goes_on(ranges, longest, b + 1, b, a):
             c.attached = 1
         c.cut = 0
         for side in (a - 1, a - 2, b + 1, b + 2):

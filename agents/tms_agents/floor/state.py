@@ -11,7 +11,8 @@ import numpy as np
 #: (x, y) m mean of where it was seen, first time seen since it was hidden, since when it has rested there, hidden or
 #: not, last time seen, hits, looks and mutes (scans since that hit it, that could have, that saw nothing at all there;
 #: of those that hit it, that saw all of it, and only what something new before it left), width m, spread m (mean
-#: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), busy (when a body was last near),
+#: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), whose (label
+#: of the last one, until owned), busy (when a body was last near),
 #: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
 #: revealed (`furniture.LOOKS`, `furniture.MOVED`),
 #: beams of the last sighting.
@@ -35,6 +36,7 @@ PRINT = np.dtype(
         ("spacing", "f8"),
         ("attached", "f8"),
         ("owner", "i8"),
+        ("whose", "i8"),
         ("owned", "f8"),
         ("busy", "f8"),
         ("revealed", "i8"),
@@ -148,7 +150,8 @@ BODY = np.dtype(
     ]
 )
 
-#: An object: place (m) and its variance (m²), half its width, times, and for how long its place was seen to be free.
+#: An object: place (m) and its variance (m²), half its width, times, for how long its place was seen to be free, and
+#: how far aside of its middle (m, along the beams), by which sensor and how often, it is met while half hidden.
 THING = np.dtype(
     [
         ("used", "i8"),
@@ -165,6 +168,9 @@ THING = np.dtype(
         ("doubt", "f8"),
         ("rate", "f8"),
         ("solid", "f8"),
+        ("part", "f8"),
+        ("part_by", "i8"),
+        ("part_hits", "i8"),
     ]
 )
 

@@ -14,7 +14,7 @@ from tms_agents.floor.prints import unlike_foot
 #: Nobody stands with the shoes or the legs so far apart (m) for so long (s).
 _SHOES_M, _LEGS_M, _ASTRIDE_S = 0.48, 0.4, 5.5
 #: So far (m) from the other a foot is seen whole; it has stood for so long (s).
-_APART_M, _STOOD_S = 0.25, 2.0
+_APART_M, _STOOD_S = 0.33, 2.0
 #: What has been nobody's for so long (s) is no foot rather than what came last.
 _IDLE_S = 1.0
 

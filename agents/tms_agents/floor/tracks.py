@@ -36,6 +36,8 @@ _FOOT_S = 1.5
 _RESTS_S = 2.0
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
+#: A foot that leaves lands so far away (m) within so long (s).
+_STRIDE_M, _STEPS_S = 1.2, 0.6
 
 
 class Tracks:
@@ -127,6 +129,14 @@ class Tracks:
             for body in self.bodies
             if body["used"] and body["confirmed"]
         ]
+
+    def elsewhere(self, label: int, x: float, y: float, t: float) -> bool:
+        """Whether the mover with the label is seen, and nowhere near (x, y)."""
+        for body in self.bodies:
+            if body["used"] and body["confirmed"] and body["label"] == label:
+                away = math.hypot(body["x"] - x, body["y"] - y) > _STRIDE_M
+                return bool(away and not body["stale"] and t - body["seen"] < self._settings.stale_s)
+        return False
 
     def _gone(self, index: int, t: float) -> list[FloorEvent]:
         body = self.bodies[index]
@@ -249,7 +259,8 @@ class Tracks:
             if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
                 continue
             x, y, seen = float(other["x"]), float(other["y"]), float(other["seen"])
-            if seen > body["first"] + 0.2:
+            steps = seen > body["first"] + 0.2
+            if steps:
                 lost = stuck(other, float(body["seen"]))
                 if lost is None:
                     continue
@@ -257,6 +268,8 @@ class Tracks:
             since = max(0.0, float(body["first"]) - seen)
             gap = math.hypot(body["x0"] - x, body["y0"] - y)
             reach = _OUT_M + min(_SPEED * since, 1.2)
+            if steps and since < _STEPS_S:
+                reach = max(reach, _STRIDE_M)
             for out_of_view, area in ((self._seated, self._seats), (self._masked, self._masks)):
                 if out_of_view(other):
                     gap, reach = min(gap, area.distance(body["x0"], body["y0"]) + 0.05), 0.7

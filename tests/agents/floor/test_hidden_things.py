@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor import FloorSettings
-from tms_agents.floor.background import FOREGROUND
-from tms_agents.floor.freespace import FREE, HIDDEN, LOOK
+from tms_agents.floor.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.freespace import FREE, HIDDEN, HIT, LOOK, PAST, look
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.objects import Objects
 from tms_agents.floor.prints import follow
@@ -43,6 +43,40 @@ def test_glimpses_past_the_edge_of_what_hides_a_thing_do_not_add_up(every: int, 
 @given(st.integers(0, 100))
 def test_a_thing_whose_place_is_seen_to_be_empty_after_all_has_gone(hidden: int) -> None:
     assert removals([HIDDEN] * hidden + [FREE] * 8) == 1
+
+
+def test_a_thing_half_hidden_has_gone_when_the_rest_of_it_is_seen_past() -> None:
+    assert removals([PAST] * 8) == 1
+    assert removals([PAST if k % 20 == 0 else HIT for k in range(500)]) == 0
+
+
+def looked(things: np.ndarray, ranges: list[float], sensor: int = 0) -> int:
+    """The verdict of a laser of nine beams at the origin on the one thing; the background is 5 m away."""
+    found, looks, n = np.array(ranges), np.zeros(1, LOOK), len(ranges)
+    states = np.where(found < 4.9, FOREGROUND, BACKGROUND).astype(np.int8)
+    bearings = 0.02 * (np.arange(n) - (n - 1) / 2)
+    rays = np.zeros((n, 10))
+    rays[:, 2], rays[:, 3], rays[:, 8], rays[:, 9] = np.cos(bearings), np.sin(bearings), np.inf, -1
+    direct, nowhere = np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]]), np.zeros(3)
+    background = np.zeros(n), np.full(n, 5.0)
+    look(things, found, states, *background, rays, direct, nowhere, -0.08, 0.02, np.zeros(n, np.bool_), sensor, looks)
+    return int(looks["verdict"][0])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_what_met_a_half_hidden_thing_tells_that_it_has_gone(side: int) -> None:
+    """One beam of some meets it for seconds; then it ends behind it. A glimpse of an edge tells nothing."""
+    things = empty(THING, 1)
+    things["used"], things["x"], things["half"], things["rate"], things["part_by"] = 1, 2.0, 0.08, 0.99, -1
+    met, gone = [5.0, 5.0, 1.0, 1.0, 1.0, 1.0, 1.96, 5.0, 5.0], [5.0, 5.0, 1.0, 1.0, 1.0, 1.0, 5.0, 5.0, 5.0]
+    hidden = [5.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 5.0]
+    assert looked(things, gone[::side]) == HIDDEN
+    assert looked(things, met[::side]) == HIT
+    assert looked(things, gone[::side]) == HIDDEN
+    assert {looked(things, met[::side]) for _ in range(40)} == {HIT}
+    assert looked(things, hidden[::side]) == HIDDEN
+    assert looked(things, gone[::side]) == PAST
+    assert looked(things, gone[::side], sensor=1) == HIDDEN
 
 
 def seen(prints: np.ndarray, x: float, width: float, t: float) -> None:

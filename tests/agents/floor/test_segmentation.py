@@ -56,6 +56,16 @@ def test_a_beam_that_saw_a_bit_of_both_sides_of_an_edge_is_dropped() -> None:
     assert len(clusters([(2.0, 1.5, 0.06)], {int(cluster["last"]) + 1: between})) == 1
 
 
+def test_what_lies_right_before_a_wall_does_not_join_it_where_one_beam_passes_for_the_wall() -> None:
+    """Two beams meet a thing 5 cm before the wall; noise lets one of them end where the wall might be."""
+    (wide,) = clusters([(4.9, 2.0, 0.02)])
+    beam, wall = int(wide["first"]), EMPTY
+    for beside in (beam - 1, beam + 1):
+        change = {k: float(wall[k]) for k in range(int(wide["first"]) - 1, int(wide["last"]) + 2)}
+        (one,) = clusters([], {**change, beam: wall[beam] - 0.035, beside: wall[beside] - 0.025})
+        assert not one["attached"]
+
+
 def test_nothing_gives_nothing_and_a_missing_beam_does_not_split() -> None:
     assert len(clusters([])) == 0
     (cluster,) = clusters([(2.0, 1.5, 0.06)])

@@ -1,0 +1,92 @@
+"""What rests may be a thing or somebody's foot: when it is told, when it waits, and whose foot it cannot be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from floor_rooms import Room, thing, together, walker
+
+from tms_agents.floor import Appeared, FloorSettings, Scene
+from tms_agents.floor.likelihood import UNLIKELY, costs
+from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.state import BODY, PRINT, THING, empty
+from tms_agents.floor.strays import release
+
+NOW = 100.0
+
+
+def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
+    """A print in full sight since so long, that nobody came near."""
+    prints = empty(PRINT, 1)
+    hits = round(10 * seconds) + 1
+    values = {"used": 1, "first": NOW - seconds, "rested": NOW - seconds, "last": NOW, "width": width, "owner": -1}
+    values |= {"hits": hits, "looks": hits, "whole": hits, "beams": 8, "spacing": 0.01, "whose": -1}
+    values |= {"owned": -1e9, "busy": -1e9, "silent": -1e9}
+    for name, value in (values | fields).items():
+        prints[name] = value
+    return prints
+
+
+def told(prints: np.ndarray, *, robots: bool = False) -> bool:
+    objects = Objects(empty(THING, 1), FloorSettings())
+    objects.robot_at = NOW - 10.0 if robots else -math.inf
+    return objects.ripe(prints, empty(BODY, 1), NOW) == [(0, OBJECT)]
+
+
+def test_what_is_as_wide_as_a_shoe_from_its_side_waits() -> None:
+    assert told(resting(1.5))
+    assert not told(resting(1.5, width=0.22))
+    assert told(resting(4.5, width=0.22))
+
+
+def test_it_waits_for_longer_where_somebody_stood_on_it() -> None:
+    assert not told(resting(20.0, width=0.22, owned=NOW - 5.0, busy=NOW - 5.0))
+    assert told(resting(20.0, width=0.12, owned=NOW - 5.0, busy=NOW - 5.0))
+    assert told(resting(30.0, width=0.22, owned=NOW - 5.0, busy=NOW - 5.0))
+
+
+def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
+    assert not told(resting(8.0, covered=81), robots=True)
+    assert told(resting(8.0, covered=81, given=1), robots=True)
+
+
+@pytest.mark.parametrize(("apart", "released"), [(0.3, 0), (0.4, 1)])
+def test_who_stands_on_two_feet_side_by_side_keeps_both(apart: float, released: int) -> None:
+    """One shoe shows its tip; a thing that is so thin lies farther off."""
+    bodies, prints = empty(BODY, 1), empty(PRINT, 2)
+    prints["used"], prints["first"], prints["last"], prints["width"] = 1, NOW - 3.0, NOW, (0.24, 0.06)
+    prints["hits"] = prints["whole"] = prints["looks"] = 30
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["shoe"], bodies["bx"] = 0.6, apart
+    bodies["a_seen"] = bodies["b_seen"] = NOW
+    bodies["a_print"], bodies["b_print"] = 0, 1
+    assert release(bodies, prints, NOW) == released
+
+
+@pytest.mark.parametrize(("away", "may_step"), [(0.7, True), (1.6, False)])
+def test_nobody_begins_by_a_step_that_is_too_long(away: float, may_step: bool) -> None:
+    """Two things put down soon after each other are nobody who goes from one to the other."""
+    bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
+    bodies["used"], bodies["first"], bodies["seen"], bodies["a_seen"], bodies["pp"] = 1, NOW - 0.6, NOW - 0.3, NOW, 0.25
+    bodies["a_print"] = bodies["b_print"] = -1
+    bodies["b_seen"] = -1e9
+    prints["used"], prints["first"], prints["last"] = 1, NOW - 0.1, NOW
+    clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = away, 6, 0.1, 0.015
+    cost = np.zeros((1, 3))
+    one = np.zeros(1, np.int64)
+    costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, NOW, cost)
+    assert bool(cost[0, :2].min() < UNLIKELY) == may_step
+
+
+def test_what_is_left_in_a_door_is_told_when_who_left_it_is_elsewhere() -> None:
+    """He puts it at his feet, so that it might be one of them, and goes on into the room."""
+    door = [(3.9, 1.0), (5.0, 1.0), (5.0, 3.0), (3.9, 3.0)]
+    scene = Scene(region=[(0, 0), (5, 0), (5, 4), (0, 4)], gates=[door])
+    comes = walker([(9.0, 4.9, 2.0), (10.0, 4.2, 2.0), (12.0, 4.2, 2.0), (15.0, 1.5, 2.0), (30.0, 1.5, 2.0)])
+    _, events = Room(together(comes, thing(4.0, 2.05, 0.05, 10.6))).play(26.0, scene=scene)
+    (put,) = [event for event in events if isinstance(event, Appeared) and event.kind == "object"]
+    assert put.t < 20.0
+    assert math.dist(put.xy, (4.0, 2.05)) < 0.03
