@@ -101,6 +101,15 @@ class Bookkeeper:
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events + self._regroup(step, explanation, gone)
 
+    def settle(self, step: Step, new: Sequence[Thing]) -> None:
+        """What came up to ``step`` was told otherwise: if it is one thing, its load gets better known from now on."""
+        self.settling = None
+        if len(new) == 1:
+            (thing,) = new
+            level, variance = step.before + step.change, step.variance - step.before_variance
+            before = np.maximum(thing.variance - variance, 0.1 * thing.variance)
+            self.settling = Settling(thing, level - thing.load, before, step.now)
+
     def _regroup(self, step: Step, explanation: Explanation, load: Array) -> list[CabinetEvent]:
         """Some of a group have gone, which were held to weigh ``load``: that tells of the others, unless more came."""
         gone = {thing.id for thing in explanation.removed}

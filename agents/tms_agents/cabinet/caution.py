@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from tms_agents.cabinet.fusion import Explanation
 from tms_agents.cabinet.naming import Namer
+from tms_agents.cabinet.position import centre_free
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf
@@ -23,6 +25,8 @@ _HEARD = 2
 _RIVAL = 0.02
 #: A hand that presses does not hold for longer than this many times what it took to press so much of it.
 _HELD, _PRESSED = 4.0, 0.85
+#: Nearer than that to a thing it may be a hand that grips it.
+_GRIP_M = 0.06
 #: What is put so soon after something that does not weigh what its tag says may be the rest of it.
 _REST_S = 8.0
 
@@ -49,7 +53,9 @@ class Caution:
         """A new load without a tag, not yet steady for long or not as quiet as a thing: somebody may lean on it."""
         if best.kind not in ("put", "two") or self._namer.loose():
             return False
-        patience = min(self._settings.untagged_s, _HELD * _rise_s(step))
+        at, geometry = centre_free(step.change, self._shelf.geometry), self._shelf.geometry
+        gripped = any(math.dist(at, thing.centre(geometry).xy) < _GRIP_M for thing in self._shelf.things.values())
+        patience = self._settings.untagged_s if gripped else min(self._settings.untagged_s, _HELD * _rise_s(step))
         return step.now - step.settled < patience or step.restless > self._settings.restless
 
     def may_be_the_rest(self, step: Step, best: Explanation) -> bool:

@@ -96,6 +96,16 @@ def test_the_place_is_told_again_when_it_is_known_better() -> None:
     assert again.cov[2] < 0.5 * appeared.cov[2]
 
 
+def test_what_was_told_by_all_that_happened_gets_better_known_too() -> None:
+    """It weighs nothing like the thing whose tag is read: no step tells that, but all that happened does."""
+    bench = Bench(seed=9, known={"A": KnownWeight(900, 5)})
+    bench.tags = frozenset({"A"})
+    events = bench.change(300 * share(0.3, 0.1), rest=9.0)
+    (appeared,), (again,) = of(Appeared, events), of(Moved, events)
+    assert again.stay == appeared.stay
+    assert again.cov[0] < appeared.cov[0]
+
+
 def test_a_thing_without_a_tag_is_told_within_half_a_second_unless_it_came_slowly() -> None:
     quick, slow = [], []
     for seed in range(8):
