@@ -82,6 +82,7 @@ class Referee:
         self._on_board: dict[str, Change] = {}
         self._to_identify: dict[str, tuple[str, float, str]] = {}  # stay -> (tag, since when it could be, situation)
         self._identified: set[str] = set()
+        self._told_xy: dict[str, Xy] = {}  # where each stay was told last, before this episode
 
     def judge(self, episode: Episode, said: list[Detection]) -> None:
         self._situation = _situation(episode)
@@ -96,6 +97,7 @@ class Referee:
         self._ins([change for change in changes if change.kind == "in"] + lifted)
         self._identities(episode)
         self._leftovers(changes)
+        self._told_xy.update(self._last_xy)
         self._compare()
 
     def _refine(self) -> None:
@@ -197,8 +199,10 @@ class Referee:
         for one in self._left:
             name = names.get(one.stay)
             told_better = name is not None and one.xy is not None and self._near(self._on_board[name], one.xy)
-            if one.kind == "move" and (name in touched or told_better):
-                continue  # also what is told on the way
+            before = self._told_xy.get(one.stay)
+            no_news = before is not None and one.xy is not None and math.dist(before, one.xy) <= NEAR_M
+            if one.kind == "move" and (name in touched or told_better or no_news):
+                continue  # also what is told on the way, and what stands where it stood, right or wrong
             self.scores.false[self._situation, one.kind] += 1
             self._example(f"{self._situation}: false {one.kind} of stay {one.stay} ({name}) at {one.at:.2f} {one.xy}")
 

@@ -186,7 +186,9 @@ def _measured_badly(
         left = step.change + thing.load
         if float(left.sum()) < 1.0:
             continue
-        score = math.log(_MEASURED if thing.since > right_at else _LATE_MEASURED) + put.same_place(thing, step)
+        score = math.log(_MEASURED if thing.since > right_at else _LATE_MEASURED) + put.same_place(
+            thing, step.change, step.variance
+        )
         found.append(Explanation("adjust", score, thing=thing, load=left))
         still, _ = put.slid(step.change, left, step.variance + spreads[thing.id])
         found.append(Explanation("slide", math.log(_SLID) + still - max(taken[thing.id], 0.0), thing=thing, load=left))

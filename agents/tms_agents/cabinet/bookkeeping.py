@@ -37,6 +37,7 @@ class Settling:
     #: It came with this step: if nothing remains of it, it was nothing.
     new: bool = True
     looked: bool = False
+    told_again: bool = False
     #: How it came, where nothing else came with it, and what that told about its place.
     way: Way | None = None
     placed: Placed | None = None
@@ -99,6 +100,15 @@ class Bookkeeper:
             self.settling = Settling(thing, settling.before, settling.variance, step.now, new=settling.new)
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events + self._regroup(step, explanation, gone)
+
+    def settle(self, step: Step, new: Sequence[Thing]) -> None:
+        """What came up to ``step`` was told otherwise: if it is one thing, its load gets better known from now on."""
+        self.settling = None
+        if len(new) == 1:
+            (thing,) = new
+            level, variance = step.before + step.change, step.variance - step.before_variance
+            before = np.maximum(thing.variance - variance, 0.1 * thing.variance)
+            self.settling = Settling(thing, level - thing.load, before, step.now)
 
     def _regroup(self, step: Step, explanation: Explanation, load: Array) -> list[CabinetEvent]:
         """Some of a group have gone, which were held to weigh ``load``: that tells of the others, unless more came."""
@@ -170,10 +180,15 @@ class Bookkeeper:
             self.settling = None
             del self._shelf.things[thing.id]
             return [Vanished(now, thing.id, *thing.centre(self._shelf.geometry)[2:])]
-        if settling.looked or now - settling.posted < self._settings.refine_after_s:
-            return []
-        settling.looked = True
-        return self._tell(thing, now)
+        rested = now - settling.posted
+        if not settling.looked and rested >= self._settings.refine_after_s:
+            settling.looked = True
+            return self._tell(thing, now)
+        if not settling.told_again and rested >= self._settings.refine_again_s and self._settings.knows_places:
+            # Not that it has moved: who fetches it shall have the best of what is known.
+            settling.told_again = True
+            return self._tell(thing, now, always=True)
+        return []
 
     def measured(self, now: float, since: float) -> int | None:
         """The stay that is sharpened while the load rests as it has ``since`` then."""

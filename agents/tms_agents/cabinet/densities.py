@@ -10,7 +10,6 @@ import numpy as np
 from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight
 from tms_agents.cabinet.position import centre_free, off_board
 from tms_agents.cabinet.stays import Thing
-from tms_agents.cabinet.steps import Step
 
 #: Weights of things are spread evenly in their logarithm between these.
 _LIGHTEST_G, _HEAVIEST_G = 3.0, 20_000.0
@@ -62,25 +61,20 @@ class PutDensity:
         """The same for a load of that weight."""
         return PutDensity(self.geometry, self._least_g, [weight])
 
-    def same_place(self, thing: Thing, step: Step, apart_m: float = 0.005) -> float:
-        """Density of a further change where ``thing`` stands: it was still being put down, or pressed."""
-        weight = step.weight_g
+    def same_place(self, thing: Thing, change: Array, variance: Array, apart_m: float = 0.005) -> float:
+        """Density of a further ``change`` where ``thing`` stands: it was still being put down, or pressed."""
+        weight = float(change.sum())
         size = max(abs(weight), 1.0)
         if weight + float(thing.load.sum()) < self._least_g:
             return -math.inf
-        here = np.array(thing.centre(self.geometry).xy) - np.array(centre_free(step.change, self.geometry))
+        here = np.array(thing.centre(self.geometry).xy) - np.array(centre_free(change, self.geometry))
         at = np.array(self.geometry.cells)
         arms, own = (at - thing.centre(self.geometry).xy).T, float(thing.load.sum())
-        cov = (arms * step.variance) @ arms.T / size**2 + (arms * thing.variance) @ arms.T / own**2
+        cov = (arms * variance) @ arms.T / size**2 + (arms * thing.variance) @ arms.T / own**2
         cov = cov + np.eye(2) * apart_m**2
         place = -0.5 * float(here @ np.linalg.solve(cov, here)) - 0.5 * math.log(float(np.linalg.det(cov)))
         place -= math.log(2 * math.pi) + 2 * math.log(size)
-        return (
-            self._weight(size, 0.0, known=False)
-            + place
-            + self._twist(step.change, step.variance, size)
-            + self._jacobian
-        )
+        return self._weight(size, 0.0, known=False) + place + self._twist(change, variance, size) + self._jacobian
 
     def slid(self, change: Array, load: Array, variance: Array) -> tuple[float, float]:
         """Densities of a step that makes ``load`` of a thing's load vector: with its weight, or still pressed."""

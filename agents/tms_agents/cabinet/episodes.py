@@ -39,6 +39,8 @@ _WAY_BLOCKS, _MOST_ODDS = 600, 4.5
 _LEAST_G, _CLEAR = 14.0, 2.0
 #: How wrong the weight of a thing may be that agrees with its tag's.
 _OFF_SHARE, _OFF_G = 0.02, 3.0
+#: What came so shortly before may have been still on its way down, and how often (log).
+_PUT_S, _STILL_PUT = 8.0, math.log(0.5)
 #: The centre of two is somewhere in the middle rather than anywhere (log density).
 _IN_THE_MIDDLE = math.log(1.5)
 #: How often something happens that nobody can explain, and a thing goes that nobody knew of.
@@ -109,6 +111,8 @@ def outcomes(
             density = alone(one.load - left, both - noises[one.id])
         else:
             density = _of_nothing(left, both, total, [things[i] for i in sorted(gone)], known.shaking)
+            if not gone:
+                density = float(np.logaddexp(density, _of_the_rest(episode, left, both, geometry)))
         if density > -math.inf:
             found.append(Outcome(gone, new, prior + density, left, both))
     found = sorted(found, key=lambda outcome: -outcome.score)[:_MOST_PATHS]
@@ -151,6 +155,13 @@ def _of_nothing(left: Array, variance: Array, total: float, gone: Sequence[Thing
         sum_more = sum((_OFF_SHARE * float(thing.load.sum()) + _OFF_G) ** 2 for thing in gone)
     well, badly = balanced(left, variance, total), balanced(left, variance + more, total + sum_more)
     return float(np.logaddexp(math.log(1 - share) + well, math.log(share) + badly))
+
+
+def _of_the_rest(episode: Episode, left: Array, variance: Array, geometry: Geometry) -> float:
+    """Log density of what is left, if something was still being put down when the board seemed to rest."""
+    put = PutDensity(geometry, _LEAST_G)
+    newest = [thing for thing in episode.things if episode.onset - thing.since < _PUT_S]
+    return max((_STILL_PUT + put.same_place(thing, left, variance) for thing in newest), default=-math.inf)
 
 
 def _unexplained(

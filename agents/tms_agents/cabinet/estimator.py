@@ -41,6 +41,8 @@ _PART_S = 3.0
 #: A load that only seems to put an error right may be a light thing on its way: unless that is so sure, it must stay so
 #: for so long.
 _SETTLED_SURE, _SETTLED_S = 0.98, 2.5
+#: A load without a tag that is less clearly one is decided by all that happened since the last rest.
+_CLEARLY = 0.9
 #: How often a lifted thing's tag is still in view after ``IN_HAND_S``: while it is carried over the board.
 _CARRIED = 0.1
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
@@ -253,6 +255,7 @@ class CabinetEstimator:
             return []
         odd = fits_none(best, step, self._namer.loose())
         odd = odd or self._caution.may_be_the_rest(step, best)
+        odd = odd or (best.kind == "put" and best.score < _CLEARLY and not self._namer.loose())
         # A slide is simple, unless something else has been brought that may stand there now.
         several = best.several and (best.kind != "slide" or bool(self._namer.loose()))
         if self._settings.knows_places and (odd or several):
@@ -286,8 +289,10 @@ class CabinetEstimator:
     def _decided(self, step: Step, outcome: Outcome) -> list[CabinetEvent]:
         """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
         self._detector.accept(step)
-        self._rested, self._book.settling = step.settled, None
+        self._rested = step.settled
+        known = set(self._shelf.things)
         events = self._hindsight.tell(outcome, step.now)
+        self._book.settle(step, [thing for i, thing in self._shelf.things.items() if i not in known])
         return events + self._name(step.now)
 
     def _name(self, t: float) -> list[CabinetEvent]:

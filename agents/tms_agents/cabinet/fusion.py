@@ -171,12 +171,14 @@ def explain(step: Step, shelf: Shelf, evidence: Evidence, settings: EstimatorSet
             pressed_on = settings.knows_places and step.weight_g > 0
             if pressed_on and not (thing is evidence.settling and evidence.settling_share > 0.3):
                 prior = math.log(_PRIOR["press"]) + each
-                found.append(Explanation("press", prior + put.same_place(thing, step, _HAND_M), thing=thing))
+                found.append(
+                    Explanation("press", prior + put.same_place(thing, change, variance, _HAND_M), thing=thing)
+                )
             if settings.knows_places and thing is evidence.settling and evidence.settling_share > 0.01:
                 prior = math.log(_PRIOR["adjust"] * evidence.settling_share)
                 # The last of it may also set it upright: its whole load shifts a little.
                 upright = _UPRIGHT_M * float(thing.load.sum()) / max(abs(step.weight_g), 1.0)
-                here = put.same_place(thing, step, math.hypot(0.005, upright))
+                here = put.same_place(thing, change, variance, math.hypot(0.005, upright))
                 found.append(Explanation("adjust", prior + here, thing=thing, load=left))
     found += _taken_and_pressed(step, found, things, put)
     for doubt in evidence.doubts:
@@ -227,12 +229,13 @@ def _taken_and_pressed(
     pressed = []
     for swap in swaps:
         assert swap.load is not None
-        left = replace(step, change=swap.load)
         for thing in things:
             if thing not in swap.removed:
                 prior = math.log(_PRIOR["take"] * _PRIOR["press"]) - 2 * math.log(len(things))
                 prior += path_odds(step, step.change - swap.load, put.geometry)
-                pressed.append(Explanation("press", prior + put.same_place(thing, left, _HAND_M), thing=thing))
+                pressed.append(
+                    Explanation("press", prior + put.same_place(thing, swap.load, step.variance, _HAND_M), thing=thing)
+                )
     return pressed
 
 

@@ -40,8 +40,9 @@ class EstimatorSettings:
     change_sd: float = 4.5
     #: ... and by so much. The laboratory's own threshold is 20 g.
     min_weight_g: float = 14.0
-    #: A load must be steady this long to count.
+    #: A load must be steady this long to count, and this long where the change is far above the noise.
     settle_s: float = 0.38
+    settle_clear_s: float = 0.3
     #: Steady: the trend is less than so many standard deviations, and no trend is more likely than going on, by this
     #: logarithm of odds.
     settle_sd: float = 2.0
@@ -74,6 +75,8 @@ class EstimatorSettings:
     refine_m: float = 0.015
     #: ... and this many of its own standard deviations.
     refine_sd: float = 3.0
-    #: Steady load after which that is looked at, and after which the estimate is final.
+    #: Steady load after which that is looked at; after which the position is told again in any case, with what is known
+    #: then; and after which the estimate is final.
     refine_after_s: float = 2.0
+    refine_again_s: float = 4.5
     refine_until_s: float = 20.0

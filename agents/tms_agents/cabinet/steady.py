@@ -20,6 +20,8 @@ from tms_agents.cabinet.settings import EstimatorSettings
 _LONGEST = 75
 _LENGTHS = (1.0, 1.2, 1.4, 1.6, 2.0, 2.4, 3.0, 3.6, 4.4, 5.4, 6.6, 8.0)
 _BEGINNINGS = 24
+#: A change is clear whose chi-square is more than this: some 100 g on a board with cells that scatter by 8 g.
+_CLEAR = 400.0
 #: Misfit of one block beyond which it tells nothing (a bump of the hand, say).
 _CAP = 9.0
 #: A thing that still rocks by this share of its weight is as good as steady.
@@ -32,12 +34,17 @@ def steady_tail(blocks: Sequence[Block], old: Array, old_variance: Array, settin
     ``blocks`` begin at the ``old`` level, (k,) g, if they are known so far back.
     """
     blocks = blocks[-_LONGEST:]
-    least = _least_length(blocks, settings.settle_s)
+    least = _least_length(blocks, settings.settle_clear_s)
     if not least:
         return []
     means = np.array([b.mean for b in blocks]) - old
     variances = np.array([b.variance for b in blocks])
     times = np.array([0.5 * (b.start + b.end) for b in blocks])
+    now = means[-least:].mean(axis=0)
+    if float((now**2 / (variances[-least:].mean(axis=0) / least + old_variance)).sum()) < _CLEAR:
+        least = _least_length(blocks, settings.settle_s)
+        if not least:
+            return []
     for length in sorted({min(math.ceil(least * factor), len(blocks)) for factor in _LENGTHS}):
         tail = slice(-length, None)
         change, variance = means[tail].mean(axis=0), variances[tail].mean(axis=0) / length + old_variance

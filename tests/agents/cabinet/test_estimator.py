@@ -16,6 +16,7 @@ from tms_agents.cabinet import (
     Geometry,
     Identified,
     KnownWeight,
+    Moved,
     Vanished,
     Zone,
     ZoneRead,
@@ -85,6 +86,39 @@ def test_put_and_taken(grams: float) -> None:
     assert of(Appeared, bench.change(thing))[0].stay != appeared.stay, "ids are never used again"
 
 
+def test_the_place_is_told_again_when_it_is_known_better() -> None:
+    bench = Bench(seed=7)
+    events = bench.change(300 * share(0.3, 0.1), rest=25.0)
+    (appeared,), (again,) = of(Appeared, events), of(Moved, events)
+    assert again.stay == appeared.stay
+    assert 4 < again.t - appeared.t < 6
+    assert again.cov[0] < 0.5 * appeared.cov[0]
+    assert again.cov[2] < 0.5 * appeared.cov[2]
+
+
+def test_what_was_told_by_all_that_happened_gets_better_known_too() -> None:
+    """It weighs nothing like the thing whose tag is read: no step tells that, but all that happened does."""
+    bench = Bench(seed=9, known={"A": KnownWeight(900, 5)})
+    bench.tags = frozenset({"A"})
+    events = bench.change(300 * share(0.3, 0.1), rest=9.0)
+    (appeared,), (again,) = of(Appeared, events), of(Moved, events)
+    assert again.stay == appeared.stay
+    assert again.cov[0] < appeared.cov[0]
+
+
+def test_a_thing_without_a_tag_is_told_within_half_a_second_unless_it_came_slowly() -> None:
+    quick, slow = [], []
+    for seed in range(8):
+        bench = Bench(seed=seed)
+        (put,) = of(Appeared, bench.change(300 * share(0.3, 0.1), 0.02))
+        quick.append(put.t - 4.02)
+        begin = bench.t
+        (put,) = of(Appeared, bench.change(300 * share(0.1, 0.2), 1.0))
+        slow.append(put.t - (begin + 1.0))
+    assert np.median(quick) < 0.5
+    assert np.median(slow) > 0.7, "a hand that presses looks like that"
+
+
 def test_nothing_happens() -> None:
     bench = Bench(seed=3)
     assert bench.run(120.0) == []
@@ -93,7 +127,7 @@ def test_nothing_happens() -> None:
 def test_a_tag_is_identified_and_one_missed_read_is_no_take() -> None:
     bench = Bench(seed=4)
     bench.tags = frozenset({"T1"})
-    (identified,) = of(Identified, bench.change(400 * share(0.1, 0.2)))
+    (identified,) = of(Identified, bench.change(400 * share(0.1, 0.2), rest=6.0))
     assert identified.tag == "T1"
     assert bench.run(60.0) == []
     assert [stay.tag for stay in bench.estimator.stays()] == ["T1"]

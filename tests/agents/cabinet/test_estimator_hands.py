@@ -169,7 +169,7 @@ def test_a_weight_without_a_tag_gets_a_stay() -> None:
 @pytest.mark.parametrize("fault", ["nan", "zero", "stuck", "overload"])
 def test_faults_of_cells_tell_nothing(fault: str) -> None:
     bench = Bench(seed=20)
-    bench.change(700 * share(0.15, 0.15))
+    bench.change(700 * share(0.15, 0.15), rest=7.0)
     before = bench.estimator.stays()
     for i in range(300):
         grams = np.round((bench.load + bench.rng.normal(0, 8, 4)) / 5) * 5
@@ -215,7 +215,7 @@ def test_vibration_and_radio_noise_tell_nothing() -> None:
 
 def test_creep_moves_the_zero_and_no_thing() -> None:
     bench = Bench(seed=22)
-    bench.change(1500 * share(0.2, 0.2))
+    bench.change(1500 * share(0.2, 0.2), rest=6.0)
     creep = 0.03 * 1500 * share(0.2, 0.2)  # 3 % within three minutes: faster than any board
     assert bench.run(180.0, lambda s: creep * s / 180) == []
     (stay,) = bench.estimator.stays()

@@ -70,6 +70,17 @@ def test_nothing_changed_is_an_outcome_too() -> None:
     assert (found.gone, found.new, found.known) == (frozenset(), (), True)
 
 
+@pytest.mark.parametrize(
+    ("since", "at", "new"), [(6.0, (0.3, 0.1), ()), (6.0, (0.1, 0.1), (None,)), (0.0, (0.3, 0.1), (None,))]
+)
+def test_a_little_more_where_something_was_just_put_is_the_rest_of_it(
+    since: float, at: tuple[float, float], new: tuple[str | None, ...]
+) -> None:
+    first = Thing(1, 26 * share(0.3, 0.1), NOISE.copy(), since, since - 1.0)
+    episode = Episode(first.load.copy(), NOISE, [first], 10.0)
+    assert best(episode, episode.level + 18 * share(*at), known()).new == new
+
+
 def test_what_no_thing_explains_is_not_explained() -> None:
     episode, _ = before()
     found = best(episode, episode.level - 900 * share(0.2, 0.15), known("A", "B", "C"))  # more than stood there
