@@ -24,6 +24,8 @@ from tms_agents.cabinet.steps import Step
 
 #: So far the sum of the cells sways while it rests.
 _SWAY_G = 5.0
+#: What follows a thing so soon, and is so small a share of it, is the rest of it where nothing else has come or gone.
+_REST_S, _REST = 3.0, 0.2
 
 
 @dataclass(slots=True)
@@ -101,14 +103,18 @@ class Bookkeeper:
             events += self._tell(thing, step.now, always=explanation.kind == "slide")
         return events + self._regroup(step, explanation, gone)
 
-    def settle(self, step: Step, new: Sequence[Thing]) -> None:
-        """What came up to ``step`` was told otherwise: if it is one thing, its load gets better known from now on."""
-        self.settling = None
+    def settle(self, step: Step, new: Sequence[Thing], gone: int) -> None:
+        """``new`` things have come up to ``step`` and so many are ``gone``, told otherwise: of one thing alone, or of
+        what was put shortly before and this is the rest of, the load gets better known from now on."""
+        settling, self.settling = self.settling, None
         if len(new) == 1:
             (thing,) = new
             level, variance = step.before + step.change, step.variance - step.before_variance
             before = np.maximum(thing.variance - variance, 0.1 * thing.variance)
             self.settling = Settling(thing, level - thing.load, before, step.now)
+        elif not new and not gone and settling is not None and _is_rest(step, settling):
+            settling.thing.forget_place()
+            self.settling = Settling(settling.thing, settling.before, settling.variance, step.now, new=settling.new)
 
     def _regroup(self, step: Step, explanation: Explanation, load: Array) -> list[CabinetEvent]:
         """Some of a group have gone, which were held to weigh ``load``: that tells of the others, unless more came."""
@@ -207,6 +213,11 @@ class Bookkeeper:
             return []
         thing.told = at.xy
         return [Moved(now, thing.id, at.xy, at.cov)]
+
+
+def _is_rest(step: Step, settling: Settling) -> bool:
+    soon = step.onset - settling.posted < _REST_S
+    return soon and abs(step.weight_g) < _REST * float(settling.thing.load.sum())
 
 
 def _sway(thing: Thing) -> Array | float:

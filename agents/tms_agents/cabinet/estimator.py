@@ -290,9 +290,10 @@ class CabinetEstimator:
         """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
         self._detector.accept(step)
         self._rested = step.settled
-        known = set(self._shelf.things)
+        before = set(self._shelf.things)
         events = self._hindsight.tell(outcome, step.now)
-        self._book.settle(step, [thing for i, thing in self._shelf.things.items() if i not in known])
+        things = self._shelf.things
+        self._book.settle(step, [things[i] for i in things.keys() - before], len(before - things.keys()))
         return events + self._name(step.now)
 
     def _name(self, t: float) -> list[CabinetEvent]:
