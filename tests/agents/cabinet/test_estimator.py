@@ -106,19 +106,6 @@ def test_what_was_told_by_all_that_happened_gets_better_known_too() -> None:
     assert again.cov[0] < appeared.cov[0]
 
 
-def test_a_thing_without_a_tag_is_told_within_half_a_second_unless_it_came_slowly() -> None:
-    quick, slow = [], []
-    for seed in range(8):
-        bench = Bench(seed=seed)
-        (put,) = of(Appeared, bench.change(300 * share(0.3, 0.1), 0.02))
-        quick.append(put.t - 4.02)
-        begin = bench.t
-        (put,) = of(Appeared, bench.change(300 * share(0.1, 0.2), 1.0))
-        slow.append(put.t - (begin + 1.0))
-    assert np.median(quick) < 0.5
-    assert np.median(slow) > 0.7, "a hand that presses looks like that"
-
-
 def test_nothing_happens() -> None:
     bench = Bench(seed=3)
     assert bench.run(120.0) == []
