@@ -89,7 +89,7 @@ def assert_measured(town: Town) -> None:
 
 
 def test_once_leaves_after_the_story_and_weight_knows_before_the_tag_is_read(tmp_path: Path) -> None:
-    done = tms_demo("--once", "--speed", "20", "--data-dir", str(tmp_path), "--weights", "--seed", "1")
+    done = tms_demo("--once", "--speed", "20", "--port", "0", "--data-dir", str(tmp_path), "--weights", "--seed", "1")
     out, err = done.communicate(timeout=150)
     assert done.returncode == 0, out + err
     assert "Traceback" not in err
@@ -139,7 +139,7 @@ def test_without_its_packages_the_laser_is_left_out_and_that_is_said() -> None:
 
 
 def test_ctrl_c_leaves_cleanly_and_stops_server_and_agents(tmp_path: Path) -> None:
-    demo = tms_demo("--speed", "20", "--data-dir", str(tmp_path))
+    demo = tms_demo("--speed", "20", "--port", "0", "--data-dir", str(tmp_path))
     assert demo.stdout is not None
     out = ""
     for line in demo.stdout:
@@ -155,7 +155,7 @@ def test_ctrl_c_leaves_cleanly_and_stops_server_and_agents(tmp_path: Path) -> No
 
 
 def test_an_agent_that_dies_is_named(tmp_path: Path) -> None:
-    demo = tms_demo("--once", "--no-laser", "--data-dir", str(tmp_path))
+    demo = tms_demo("--once", "--no-laser", "--port", "0", "--data-dir", str(tmp_path))
     assert demo.stdout is not None
     out = ""
     for line in demo.stdout:
