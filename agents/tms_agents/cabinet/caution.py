@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from tms_agents.cabinet.fusion import Explanation
 from tms_agents.cabinet.naming import Namer
+from tms_agents.cabinet.plateau import fits_none
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf
@@ -19,6 +20,8 @@ _SEVERAL_S = 0.7
 _HEARD = 2
 #: Rounds still to come may decide between explanations that are more probable than this.
 _RIVAL = 0.02
+#: A load without a tag that is less probable than that may be something else.
+_CLEARLY = 0.9
 #: What is put so soon after something that does not weigh what its tag says may be the rest of it.
 _REST_S = 8.0
 
@@ -47,7 +50,14 @@ class Caution:
             return False
         return step.now - step.settled < self._settings.untagged_s or step.restless > self._settings.restless
 
-    def may_be_the_rest(self, step: Step, best: Explanation) -> bool:
+    def odd(self, step: Step, best: Explanation) -> bool:
+        """Not what the tags tell, or hardly more probable than something else: all that happened may know better."""
+        loose = self._namer.loose()
+        if fits_none(best, step, loose) or self._may_be_the_rest(step, best):
+            return True
+        return best.kind == "put" and best.score < _CLEARLY and not loose
+
+    def _may_be_the_rest(self, step: Step, best: Explanation) -> bool:
         """Whether something that does not weigh what its tag says has just been put, so that this may be more of it."""
         if best.kind not in ("put", "swap", "two"):
             return False

@@ -20,7 +20,7 @@ from tms_agents.cabinet.geometry import Array, Geometry, KnownWeight, Zone
 from tms_agents.cabinet.hindsight import Hindsight
 from tms_agents.cabinet.naming import Namer
 from tms_agents.cabinet.noise import Noise
-from tms_agents.cabinet.plateau import Plateau, fits_none
+from tms_agents.cabinet.plateau import Plateau
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf, Thing
@@ -41,8 +41,6 @@ _PART_S = 3.0
 #: A load that only seems to put an error right may be a light thing on its way: unless that is so sure, it must stay so
 #: for so long.
 _SETTLED_SURE, _SETTLED_S = 0.98, 2.5
-#: A load without a tag that is less clearly one is decided by all that happened since the last rest.
-_CLEARLY = 0.9
 #: How often a lifted thing's tag is still in view after ``IN_HAND_S``: while it is carried over the board.
 _CARRIED = 0.1
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
@@ -253,9 +251,7 @@ class CabinetEstimator:
             else:
                 self._detector.accept(step)
             return []
-        odd = fits_none(best, step, self._namer.loose())
-        odd = odd or self._caution.may_be_the_rest(step, best)
-        odd = odd or (best.kind == "put" and best.score < _CLEARLY and not self._namer.loose())
+        odd = self._caution.odd(step, best)
         # A slide is simple, unless something else has been brought that may stand there now.
         several = best.several and (best.kind != "slide" or bool(self._namer.loose()))
         if self._settings.knows_places and (odd or several):
