@@ -45,6 +45,7 @@ class Balance:
     def __init__(self, shelf: Shelf, settings: EstimatorSettings) -> None:
         self._shelf, self._settings = shelf, settings
         self._ledger: Ledger | None = None
+        #: When the zeros were followed last.
         self._seen = -math.inf
         self._off_since: float | None = None
         #: When the sum was right last.
@@ -95,9 +96,10 @@ class Balance:
     def compare(self, onset: float, settled: float, now: float, level: Array, variance: Array) -> Step:
         """The step from what the stays make of the zeros to ``level``."""
         assert self._ledger is not None
-        hours = max(now - self._seen, 0.0) / 3600.0
+        # Creep of what stands there: a random walk that has gone through its share of the load after an hour, and has
+        # come to an end by then where nobody looked for longer.
+        hours = min(max(now - self._seen, 0.0) / 3600.0, 1.0)
         self._seen = now
-        # Creep of what stands there: a random walk that has gone through its share of the load after an hour.
         creep = 3 * self._settings.creep_per_hour * np.abs(self._shelf.total())
         self._ledger.walk((_WALK_G**2 + creep**2) * hours)
         self._ledger.keep(self._shelf.things)
@@ -118,11 +120,12 @@ class Balance:
         return max(total, whole) > self._settings.change_sd**2
 
     def to_dict(self) -> dict[str, Any]:
-        return {} if self._ledger is None else self._ledger.to_dict()
+        return {} if self._ledger is None else self._ledger.to_dict() | {"seen": self._seen}
 
     def restore(self, state: dict[str, Any]) -> None:
         if "cov" in state:
             self._ledger = Ledger.from_dict(state)
+            self._seen = float(state.get("seen", -math.inf))
 
 
 def search(

@@ -123,3 +123,23 @@ def test_the_zeros_survive_a_restart() -> None:
     assert again.to_dict()["balance"]["mean"] == bench.estimator.to_dict()["balance"]["mean"]
     del state["balance"]  # as an earlier version saved it
     assert CabinetEstimator.from_dict(state, GEOMETRY, zones=ZONES).stays()
+
+
+@pytest.mark.parametrize("away_s", [2.0, 5 * 86400.0])
+def test_loads_are_followed_on_after_a_restart(away_s: float) -> None:
+    """However long the agent was away: what stands there keeps its load, and what was taken meanwhile is missed."""
+    bench = Bench(seed=7)
+    bench.change(400 * share(0.1, 0.1), rest=5.0)
+    bench.change(700 * share(0.3, 0.2), rest=5.0)
+    state = json.loads(json.dumps(bench.estimator.to_dict()))
+    light, heavy = bench.estimator.stays()
+    bench.estimator = CabinetEstimator.from_dict(state, GEOMETRY, zones=ZONES)
+    bench.t += away_s
+    bench.run(20.0)
+    for stay, before in zip(bench.estimator.stays(), (light, heavy), strict=True):
+        assert (stay.id, stay.weight_g) == (before.id, pytest.approx(before.weight_g, abs=8.0))
+    bench.estimator = CabinetEstimator.from_dict(state, GEOMETRY, zones=ZONES)
+    bench.load = 700 * share(0.3, 0.2)
+    bench.t += away_s
+    (vanished,) = of(Vanished, bench.run(20.0))
+    assert vanished.stay == light.id
