@@ -114,6 +114,8 @@ class LabelView(Model):
     ghost: bool = False
     #: A robot put it there and told so (drawn hollow).
     put_by_robot: bool = False
+    #: What its sensor weighed there, grams.
+    weight_g: float | None = None
     contents: dict[str, float] = {}
 
 

@@ -9,6 +9,7 @@ from tms_agents.cabinet.events import (
     Moved,
     Stay,
     Vanished,
+    Weighed,
     ZoneRead,
 )
 from tms_agents.cabinet.geometry import Covariance, Geometry, KnownWeight, Zone
@@ -27,6 +28,7 @@ __all__ = [
     "Moved",
     "Stay",
     "Vanished",
+    "Weighed",
     "Zone",
     "ZoneRead",
 ]

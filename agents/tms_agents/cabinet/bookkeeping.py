@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished
+from tms_agents.cabinet.events import Appeared, CabinetEvent, Moved, Vanished, Weighed
 from tms_agents.cabinet.fusion import Doubt, Explanation
 from tms_agents.cabinet.geometry import Array
 from tms_agents.cabinet.placing import Placed, Way, place, refine
@@ -64,8 +64,8 @@ class Bookkeeper:
                 odds = math.log(other.score / chosen.score)
                 self.doubts.append(Doubt(chosen.thing, other.thing, step.change, odds))
 
-    def apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
-        """Do to the shelf what ``explanation`` says about ``step``."""
+    def apply(self, step: Step, explanation: Explanation, *, pressed: bool = False) -> list[CabinetEvent]:
+        """Do to the shelf what ``explanation`` says about ``step``; a hand may still be ``pressed`` on what is put."""
         events: list[CabinetEvent] = []
         settling, self.settling = self.settling, None
         if explanation.undo is not None:
@@ -83,8 +83,8 @@ class Bookkeeper:
             if explanation.kind == "put":
                 self._place(self.settling, step)
             at = thing.centre(self._shelf.geometry)
-            thing.told = at.xy
-            events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))
+            thing.told, thing.weighed = at.xy, not pressed
+            events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g, pressed))
             self.newest = [thing]
         elif explanation.kind in ("two", "joint"):
             events += self._put_two(step, explanation)
@@ -171,7 +171,20 @@ class Bookkeeper:
         return Vanished(step.now, thing.id, weight_g, math.sqrt(1 / (stood + missing)))
 
     def rest(self, now: float, level: Array, variance: Array, since: float) -> list[CabinetEvent]:
-        """The load has rested at ``level`` from ``since`` on: sharpen the thing that was put last."""
+        """The load has rested at ``level`` from ``since`` on: sharpen the thing that was put last, and weigh it."""
+        return self._sharpen(now, level, variance, since) + self._weigh(now)
+
+    def _weigh(self, now: float) -> list[CabinetEvent]:
+        events: list[CabinetEvent] = []
+        for thing in self._shelf.things.values():
+            if thing.weighed or now - thing.since < self._settings.untagged_s:
+                continue
+            thing.weighed = True
+            if not thing.joint:  # else their sum has been told
+                events.append(Weighed(now, thing.id, *thing.centre(self._shelf.geometry)[2:]))
+        return events
+
+    def _sharpen(self, now: float, level: Array, variance: Array, since: float) -> list[CabinetEvent]:
         settling = self.settling
         if settling is None or self.measured(now, since) is None:
             return []

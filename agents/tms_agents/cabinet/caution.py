@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+
+import numpy as np
 
 from tms_agents.cabinet.fusion import Explanation
 from tms_agents.cabinet.naming import Namer
 from tms_agents.cabinet.plateau import fits_none
+from tms_agents.cabinet.position import centre_free
 from tms_agents.cabinet.presence import Presence
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.stays import Shelf
@@ -20,6 +24,10 @@ _SEVERAL_S = 0.7
 _HEARD = 2
 #: Rounds still to come may decide between explanations that are more probable than this.
 _RIVAL = 0.02
+#: A hand that presses does not hold for longer than this many times what it took to press so much of it.
+_HELD, _PRESSED = 4.0, 0.85
+#: Nearer than that to a thing it may be a hand that grips it.
+_GRIP_M = 0.06
 #: A load without a tag that is less probable than that may be something else.
 _CLEARLY = 0.9
 #: What is put so soon after something that does not weigh what its tag says may be the rest of it.
@@ -45,10 +53,18 @@ class Caution:
         return best.score < 0.97 or not heard or step.now - step.settled < _SEVERAL_S
 
     def may_be_an_arm(self, step: Step, best: Explanation) -> bool:
-        """A new load without a tag, not yet steady for long or not as quiet as a thing: somebody may lean on it."""
+        """A new load without a tag, hardly steady yet or not as quiet as a thing: somebody may lean on it, or grip what
+        stands there. What came quickly is steady soon."""
         if best.kind not in ("put", "two") or self._namer.loose():
             return False
-        return step.now - step.settled < self._settings.untagged_s or step.restless > self._settings.restless
+        at, geometry = centre_free(step.change, self._shelf.geometry), self._shelf.geometry
+        gripped = any(math.dist(at, thing.centre(geometry).xy) < _GRIP_M for thing in self._shelf.things.values())
+        patience = self._settings.untagged_s if gripped else min(self._settings.untagged_s, _HELD * _rise_s(step))
+        return step.now - step.settled < patience or step.restless > self._settings.restless
+
+    def may_be_pressed(self, step: Step, best: Explanation) -> bool:
+        """A new load without a tag that has not been steady for long: what it weighs may be a hand's."""
+        return best.kind == "put" and not self._namer.loose() and step.now - step.settled < self._settings.untagged_s
 
     def odd(self, step: Step, best: Explanation) -> bool:
         """Not what the tags tell, or hardly more probable than something else: all that happened may know better."""
@@ -74,3 +90,13 @@ class Caution:
         """Whether the rounds have told if the tag has gone; one that is read may be in the hand at first."""
         read, missed = self._presence.rounds(tag, since)
         return (read == 0 and missed >= _HEARD) or any(self._presence.rounds(tag, since + IN_HAND_S))
+
+
+def _rise_s(step: Step) -> float:
+    """How long the load took to be nearly what it is now."""
+    if not len(step.path):
+        return 0.0
+    share = step.path @ step.change / float(step.change @ step.change)
+    rising = np.flatnonzero(share < _PRESSED)
+    # The last of these blocks is where it got there: half of that, on average.
+    return (float(rising[-1]) + 0.5) / len(step.path) * (step.settled - step.onset) if len(rising) else 0.0

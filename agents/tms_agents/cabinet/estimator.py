@@ -317,7 +317,7 @@ class CabinetEstimator:
             self._namer.left(thing, step.settled, weight_g, at.weight_sd_g)
         self._rested = step.settled
         self._book.newest = []
-        events = self._book.apply(step, explanation)
+        events = self._book.apply(step, explanation, pressed=self._caution.may_be_pressed(step, explanation))
         for thing, tag in zip(self._book.newest, explanation.tags, strict=False):
             events.append(self._namer.pin(step.now, thing, tag))
         if explanation.kind == "take" and explanation.thing is not None and explanation.removed[0].tag is not None:

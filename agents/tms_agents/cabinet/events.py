@@ -22,12 +22,26 @@ class Stay:
 
 @dataclass(frozen=True)
 class Appeared:
-    """A thing was put on the board."""
+    """A thing was put on the board.
+
+    ``pressed``: a hand may still press on it, so that its weight is only a guess; ``Weighed`` follows if it stays.
+    """
 
     t: float
     stay: int
     xy: tuple[float, float]
     cov: Covariance
+    weight_g: float
+    weight_sd_g: float
+    pressed: bool = False
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What a thing weighs that was told while a hand might still press on it; once."""
+
+    t: float
+    stay: int
     weight_g: float
     weight_sd_g: float
 
@@ -83,4 +97,4 @@ class ZoneRead:
     tag: str | None
 
 
-CabinetEvent = Appeared | Vanished | Moved | Identified | LoadChanged | ZoneRead
+CabinetEvent = Appeared | Weighed | Vanished | Moved | Identified | LoadChanged | ZoneRead

@@ -13,6 +13,7 @@ from tms_agents.cabinet import (
     Moved,
     Stay,
     Vanished,
+    Weighed,
     ZoneRead,
 )
 from tms_agents.cabinet.frames import BoardPose, Covariance
@@ -81,11 +82,12 @@ class Labels:
             return RawRead(seq=0, observed_at=at, zone=event.zone, tag=event.tag)
         if isinstance(event, Appeared):
             label = self.of[event.stay] = self._new_label()
-            told = {} if tag is None else {"tag": tag}
-            place = self._place(event.xy, event.cov)
-            return LabelAppeared(
-                seq=0, observed_at=at, label=label, kind="cabinet", weight_g=_grams(event.weight_g), **place, **told
-            )
+            told = self._place(event.xy, event.cov)
+            if not event.pressed:
+                told["weight_g"] = _grams(event.weight_g)
+            if tag is not None:
+                told["tag"] = tag
+            return LabelAppeared(seq=0, observed_at=at, label=label, kind="cabinet", **told)
         if isinstance(event, LoadChanged):
             labels = [self.of[stay] for stay in event.stays if stay in self.of]
             weight = round(event.weight_g, 3)
@@ -96,6 +98,8 @@ class Labels:
         if isinstance(event, Vanished):
             del self.of[event.stay]
             return LabelVanished(seq=0, observed_at=at, label=named, weight_g=_grams(event.weight_g))
+        if isinstance(event, Weighed):
+            return LoadChange(seq=0, observed_at=at, labels=[named], weight_g=_grams(event.weight_g))
         if isinstance(event, Moved):
             return LabelMoved(seq=0, observed_at=at, label=named, **self._place(event.xy, event.cov))
         return TagObserved(seq=0, observed_at=at, label=named, tag=event.tag)
@@ -115,7 +119,7 @@ class Labels:
         return placed
 
 
-_RANKS: dict[type, int] = {Vanished: 1, Moved: 2, Appeared: 3, Identified: 5, ZoneRead: 6}
+_RANKS: dict[type, int] = {Vanished: 1, Moved: 2, Appeared: 3, Weighed: 4, Identified: 5, ZoneRead: 6}
 
 
 def _rank(event: CabinetEvent) -> int:

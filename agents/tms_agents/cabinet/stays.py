@@ -32,6 +32,8 @@ class Thing:
     known: KnownWeight | None = None
     #: Ids of the things that came in the same step: only the sum of their loads is known.
     joint: frozenset[int] = frozenset()
+    #: Its weight has been told; not yet where a hand might still have pressed on it.
+    weighed: bool = True
     #: Position last told.
     told: tuple[float, float] = (0.0, 0.0)
     #: What the way on which the load came tells about the place: how far it is from where the load itself says, and its
@@ -145,6 +147,7 @@ class Shelf:
                     "tag": thing.tag,
                     "known": None if thing.known is None else [thing.known.mean_g, thing.known.sd_g],
                     "joint": sorted(thing.joint),
+                    "weighed": thing.weighed,
                     "told": list(thing.told),
                     "placed": [*thing.aside, *thing.sharper],
                 }
@@ -168,6 +171,7 @@ class Shelf:
                 tag=item["tag"],
                 known=None if item["known"] is None else KnownWeight(*item["known"]),
                 joint=frozenset(item["joint"]),
+                weighed=bool(item.get("weighed", True)),
                 told=(float(item["told"][0]), float(item["told"][1])),
                 aside=_pair(item.get("placed", (0, 0))[:2]),
                 sharper=_pair(item.get("placed", (0, 0, 1, 1))[2:]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tms_agents.cabinet import Appeared, CabinetEvent, Identified, LoadChanged, Moved, Vanished
+from tms_agents.cabinet import Appeared, CabinetEvent, Identified, LoadChanged, Moved, Vanished, Weighed
 
 
 def told(board: str, event: CabinetEvent) -> str:
@@ -10,6 +10,8 @@ def told(board: str, event: CabinetEvent) -> str:
         what = f"put    #{event.stay} {event.weight_g:.0f} g at {_at(event.xy)}"
     elif isinstance(event, Vanished):
         what = f"taken  #{event.stay} {abs(event.weight_g):.0f} g"
+    elif isinstance(event, Weighed):
+        what = f"weight #{event.stay} is {event.weight_g:.0f} g"
     elif isinstance(event, Moved):
         what = f"moved  #{event.stay} to {_at(event.xy)}"
     elif isinstance(event, Identified):

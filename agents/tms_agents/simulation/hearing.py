@@ -38,7 +38,12 @@ class Hearing:
         if wish.connected and (why := self._unconnected(world)):
             return why
         labels = self._town.labels(self._room)
-        return self._untold(world, labels) or self._unread(world, labels, wish.unread) or None
+        return (
+            self._untold(world, labels)
+            or self._unread(world, labels, wish.unread)
+            or (_unweighed(labels) if wish.unread else None)
+            or None
+        )
 
     def _unconnected(self, world: World) -> str:
         for agent in (*world.cabinets, ROBOT_AGENT, *([FLOOR_AGENT] if self._laser else [])):
@@ -79,6 +84,12 @@ class Hearing:
             self._read[tag] = place
         self._read = {tag: place for tag, place in self._read.items() if world.places[tag] == place}
         return ""
+
+
+def _unweighed(answer: LabelsAnswer) -> str:
+    """What has no tag to tell it is known by its weight."""
+    late = [one.agent for one in answer.labels if one.kind == "cabinet" and not one.ghost and one.weight_g is None]
+    return f"agent {late[0]} is late: it has not told what something weighs" if late else ""
 
 
 def _there(world: World) -> Mapping[tuple[str | None, Kind], int]:

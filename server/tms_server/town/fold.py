@@ -152,8 +152,12 @@ def _keep(fold: RoomFold, event: events.Event) -> None:
                 kind, fold.record.agent, event.xy, now, now, event.z, None, event.cov, event.surface
             )
             fold.state.unannounced.pop((fold.record.agent, event.label), None)
-            if isinstance(event, events.LabelAppeared) and event.tag is not None:
-                _read_at(fold, event.tag, event.label)
+            if isinstance(event, events.LabelAppeared):
+                labels[event.label] = labels[event.label]._replace(weight_g=event.weight_g)
+                if event.tag is not None:
+                    _read_at(fold, event.tag, event.label)
+        case events.LoadChange(labels=[label]) if event.weight_g > 0:
+            labels[label] = labels[label]._replace(weight_g=event.weight_g, updated=now)
         case events.LabelVanished():
             labels[event.label] = labels[event.label]._replace(ghost=True, updated=now)
             states = fold.engine.labels
@@ -177,6 +181,7 @@ def _keep(fold: RoomFold, event: events.Event) -> None:
                 labels[event.to] = LabelInfo(
                     event.kind or old.kind, fold.record.agent, event.xy or old.xy, now, now, event.z, None, event.cov,
                     event.surface, old.tag, put_by_robot=old.kind == "robot" and event.kind != "robot",
+                    weight_g=old.weight_g,
                 )  # fmt: skip
 
 

@@ -32,6 +32,8 @@ class LabelInfo(NamedTuple):
     tag: str | None = None
     ghost: bool = False
     put_by_robot: bool = False
+    #: What its sensor weighed there, grams.
+    weight_g: float | None = None
 
 
 class AgentInfo(NamedTuple):

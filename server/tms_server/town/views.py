@@ -164,6 +164,7 @@ class RoomView:
             stale=self.places.stale(info),
             ghost=info.ghost,
             put_by_robot=info.put_by_robot,
+            weight_g=info.weight_g,
             contents=self._contents.get(name, {}),
         )
 

@@ -18,6 +18,7 @@ from tms_agents.cabinet import (
     KnownWeight,
     Moved,
     Vanished,
+    Weighed,
     Zone,
     ZoneRead,
 )
@@ -104,6 +105,46 @@ def test_what_was_told_by_all_that_happened_gets_better_known_too() -> None:
     (appeared,), (again,) = of(Appeared, events), of(Moved, events)
     assert again.stay == appeared.stay
     assert again.cov[0] < appeared.cov[0]
+
+
+def test_a_thing_without_a_tag_is_told_within_half_a_second_unless_it_came_slowly() -> None:
+    quick, slow = [], []
+    for seed in range(8):
+        bench = Bench(seed=seed)
+        (put,) = of(Appeared, bench.change(300 * share(0.3, 0.1), 0.02))
+        quick.append(put.t - 4.02)
+        begin = bench.t
+        (put,) = of(Appeared, bench.change(300 * share(0.1, 0.2), 1.0))
+        slow.append(put.t - (begin + 1.0))
+    assert np.median(quick) < 0.5
+    assert np.median(slow) > 0.7, "a hand that presses looks like that"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_weight_is_told_when_no_hand_presses_any_more(seed: int) -> None:
+    bench = Bench(seed=seed)
+    at = share(0.3, 0.1)
+    bench.load = 350 * at
+    told = bench.run(0.6)
+    bench.load = 300 * at
+    told += bench.run(8.0)
+    (put,) = of(Appeared, told)
+    (weighed,) = of(Weighed, told)
+    assert put.pressed and weighed.stay == put.stay
+    assert 0.8 < weighed.t - put.t + 0.5 < 3.0
+    assert weighed.weight_g == pytest.approx(300, abs=4 * weighed.weight_sd_g + 3)
+    assert of(Weighed, bench.run(30.0)) == []
+
+
+def test_a_weight_that_is_owed_is_told_after_a_restart() -> None:
+    bench = Bench(seed=4)
+    bench.load = 300 * share(0.3, 0.1)
+    told = bench.run(0.6)
+    assert of(Appeared, told) and not of(Weighed, told)
+    state = json.loads(json.dumps(bench.estimator.to_dict()))
+    bench.estimator = CabinetEstimator.from_dict(state, GEOMETRY, zones=ZONES)
+    (weighed,) = of(Weighed, bench.run(4.0))
+    assert weighed.weight_g == pytest.approx(300, abs=15)
 
 
 def test_nothing_happens() -> None:

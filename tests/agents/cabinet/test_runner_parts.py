@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tms_agents.cabinet import Appeared, Identified, LoadChanged, Moved, Stay, Vanished, ZoneRead
+from tms_agents.cabinet import Appeared, Identified, LoadChanged, Moved, Stay, Vanished, Weighed, ZoneRead
 from tms_agents.cabinet.continuity import Continuity
 from tms_agents.cabinet.field_turns import FieldTurns
 from tms_agents.cabinet.frames import BoardPose
@@ -209,6 +209,14 @@ def test_one_instant_is_told_in_the_order_of_the_wire():
     assert (told[1].labels, told[5].labels) == (["a/1"], ["a/4"])
     assert told[0].xy == pytest.approx((1.8, 1.2)) and told[0].cov == pytest.approx((4e-4, 0.0, 1e-4))
     assert set(made.of) == {2, 3, 4}
+
+
+def test_what_a_hand_may_still_press_on_is_weighed_later():
+    made = labels()
+    early = Appeared(1.0, 1, (0.1, 0.2), COV, 540.0, 1.0, pressed=True)
+    told = made.observations([early, Weighed(2.0, 1, 500.0, 1.0)])
+    assert told[0].weight_g is None
+    assert (told[1].type, told[1].labels, told[1].weight_g) == ("load_change", ["a/1"], 500.0)
 
 
 def test_an_event_about_a_stay_that_nobody_knows_is_not_told():

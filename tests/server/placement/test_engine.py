@@ -113,6 +113,21 @@ def test_idle_events_change_no_bit(seed: int) -> None:
     assert list(engine.hypotheses()) == before
 
 
+@given(st.sampled_from("abc"), st.floats(50.0, 400.0))
+@settings(max_examples=30, deadline=None)
+def test_a_weight_tells_the_same_with_the_label_and_after_it(left: str, grams: float) -> None:
+    at_once, later = (small(p_phantom={"cabinet": 0.1}, p_jump=0.01) for _ in range(2))
+    put = {"label": "B1", "kind": "cabinet", "xy": (0.5, 0.3)}
+    for engine in (at_once, later):
+        for thing in "abc".replace(left, ""):
+            engine.apply(event("label_vanished", label=f"A{thing}"), key(0))
+    at_once.apply(event("label_appeared", **put, weight_g=grams), key(1))
+    later.apply(event("label_appeared", **put), key(1))
+    later.apply(event("load_change", labels=["B1"], weight_g=grams), key(2))
+    for thing in "abc":
+        assert later.marginal(thing) == pytest.approx(at_once.marginal(thing), abs=1e-9)
+
+
 def test_draws_follow_the_key_alone() -> None:
     def dropped(seed: int) -> bytes:
         engine = small(budget=1)

@@ -62,6 +62,18 @@ async def test_labels_lie_on_furniture(lab, tell) -> None:
     assert labels["cab/1"].contents["E1"] > 0.9
 
 
+async def test_labels_tell_what_was_weighed_there(lab, tell) -> None:
+    async def weights() -> dict[str, float | None]:
+        return {one.label: one.weight_g for one in (await lab.belief()).labels().labels}
+
+    await tell("cab", **THING)
+    await tell("cab", **{**THING, "label": "cab/2", "tag": "E2", "weight_g": 250.0})
+    assert await weights() == {"cab/1": None, "cab/2": 250.0}
+    await tell("cab", type="load_change", labels=["cab/1"], weight_g=320.0)
+    await tell("cab", type="load_change", labels=["cab/1", "cab/2"], weight_g=-570.0)
+    assert await weights() == {"cab/1": 320.0, "cab/2": 250.0}
+
+
 async def test_a_mover_given_by_position_is_the_nearest(lab, tell) -> None:
     await tell("floor", type="mover_entered", label="floor/2", xy=[3.0, 1.0])
     await tell("cab", **THING)

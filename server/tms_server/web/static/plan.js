@@ -123,9 +123,10 @@ function updateLabel(node, one, model) {
   node.classList.toggle("stale", one.stale);
   node.classList.toggle("ghost", one.ghost);
   const held = contents(one, model).map(({ name, p }) => `${name} ${percent(p)}`).join(", ") || "nothing known";
+  const weight = one.weight_g == null ? "" : `, ${Math.round(one.weight_g)} g`;
   const state = one.ghost ? " (hidden)" : one.stale ? " (its sensor is silent)" : "";
-  text(node.firstElementChild, `${one.label}${state}: ${held}`);
-  set(node, { "aria-label": `${one.label}${state}: ${held}` });
+  text(node.firstElementChild, `${one.label}${weight}${state}: ${held}`);
+  set(node, { "aria-label": `${one.label}${weight}${state}: ${held}` });
 }
 
 function newMover(one, model, colour) {
