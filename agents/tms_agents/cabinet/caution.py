@@ -54,12 +54,14 @@ class Caution:
 
     def may_be_an_arm(self, step: Step, best: Explanation) -> bool:
         """A new load without a tag, hardly steady yet or not as quiet as a thing: somebody may lean on it, or grip what
-        stands there. What came quickly is steady soon."""
+        stands there, or its tag is still to be read. What came quickly is steady soon."""
         if best.kind not in ("put", "two") or self._namer.loose():
             return False
         at, geometry = centre_free(step.change, self._shelf.geometry), self._shelf.geometry
         gripped = any(math.dist(at, thing.centre(geometry).xy) < _GRIP_M for thing in self._shelf.things.values())
-        patience = self._settings.untagged_s if gripped else min(self._settings.untagged_s, _HELD * _rise_s(step))
+        patience = self._settings.untagged_s
+        if not gripped and not self._presence.undecided(step.onset):
+            patience = min(patience, _HELD * _rise_s(step))
         return step.now - step.settled < patience or step.restless > self._settings.restless
 
     def may_be_pressed(self, step: Step, best: Explanation) -> bool:

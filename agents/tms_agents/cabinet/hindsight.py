@@ -203,10 +203,16 @@ class Hindsight:
 
 def _trusting(found: Sequence[Outcome], told: Told) -> list[Outcome]:
     """The same, with what was told step by step more probable: each step was explained by what the load was then."""
-    weights = [one.score * (_TOLD if one.known and _same(one, told) else 1.0) for one in found]
+    weights = [one.score * (_TOLD if one.known and (_same(one, told) or _one(one, told)) else 1.0) for one in found]
     total = sum(weights)
     trusted = [replace(one, score=weight / total) for one, weight in zip(found, weights, strict=True)]
     return sorted(trusted, key=lambda one: -one.score)
+
+
+def _one(outcome: Outcome, told: Told) -> bool:
+    """Whether two loads without a tag that were told are one thing that was put down slowly."""
+    gone, new = told
+    return new.count(None) > 1 and (outcome.gone, order((*outcome.new, None))) == (gone, new)
 
 
 def _same(outcome: Outcome, told: Told) -> bool:

@@ -12,6 +12,8 @@ from tms_agents.cabinet.settings import EstimatorSettings
 #: Limits of the log-odds: about two reads make a tag present, about four misses make it gone.
 _LEAST, _MOST = -5.0, 8.0
 _PRESENT, _GONE = 2.0, -2.0
+#: So long before its thing is put a tag may be read first.
+_BROUGHT_S = 1.0
 _ROUNDS_KEPT = 64
 _TAGS_KEPT = 2000
 
@@ -99,6 +101,14 @@ class Presence:
             read = set() if sighting is None else {t for t, seen in sighting.rounds if seen}
             found.append([t in read for t in times if t >= start])
         return max(found, default=[], key=lambda one: (sum(one), -len(one)))
+
+    def undecided(self, since: float) -> bool:
+        """Whether a tag may have come into view at ``since`` that is not present yet: it was read, but too rarely, or
+        some zone has not looked since then."""
+        if any(times[-1] < since for times in self._rounds.values()):
+            return True
+        seen = (sighting for tags in self._zones.values() for sighting in tags.values())
+        return any(not one.present and one.last >= since - _BROUGHT_S and one.last > one.left for one in seen)
 
     def silent_rounds(self, tag: str, start: float) -> int:
         """Rounds from ``start`` until the tag was first read in this visit, in the zone that read it first."""

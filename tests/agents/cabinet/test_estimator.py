@@ -136,6 +136,21 @@ def test_the_weight_is_told_when_no_hand_presses_any_more(seed: int) -> None:
     assert of(Weighed, bench.run(30.0)) == []
 
 
+@pytest.mark.parametrize("first", [0.1, 0.3, 0.4])
+def test_a_tag_that_was_read_once_is_waited_for(first: float) -> None:
+    """A slow reader: what comes at once is not told without the tag that the next round makes sure of."""
+    bench = Bench(seed=8)
+    begin, told = bench.t, []
+    bench.load = 300 * share(0.3, 0.1)
+    for i in range(100):
+        t = begin + 0.02 * i
+        told += bench.estimator.load(t, np.round((bench.load + bench.rng.normal(0.0, 8.0, 4)) / 5) * 5)
+        if (i - round(first * 50)) % 25 == 0:
+            told += bench.estimator.inventory(t, "shelf", frozenset({"T"} if i >= first * 50 else ()))
+    (put,), (tag,) = of(Appeared, told), of(Identified, told)
+    assert tag.stay == put.stay and tag.t == pytest.approx(put.t, abs=1e-9)
+
+
 def test_a_weight_that_is_owed_is_told_after_a_restart() -> None:
     bench = Bench(seed=4)
     bench.load = 300 * share(0.3, 0.1)

@@ -39,7 +39,7 @@ async def test_things_come_and_go_in_room_coordinates(rig):
             shelf.take("milk")
             (mug,) = (await cabinet.count(1)).values()
             assert mug.label != milk.label
-            await until(lambda: town.where("Mug").best.label == mug.label)
+            await until(lambda: town.where("Mug").best is not None and town.where("Mug").best.label == mug.label)
             assert any(frame.data[:2] == b"\x9e\x00" for frame in reader.heard)  # weighed with the field off
         assert (await cabinet.view()).state == "silent"
     assert town.anomalies(cabinet.name).anomalies == []
