@@ -14,10 +14,11 @@ from tms_agents.slam.geometry import Floats, transform
 from tms_agents.slam.gridmap import GridMap, grid_map, render
 from tms_agents.slam.keyframes import key_scans
 from tms_agents.slam.logs import Log
-from tms_agents.slam.occupancy import HIGHEST
+from tms_agents.slam.occupancy import HIGHEST, UNKNOWN
 from tms_agents.slam.semidynamic.evidence import CELL_M, Place, count_beams
 from tms_agents.slam.semidynamic.models import Models
 from tms_agents.slam.semidynamic.outlines import Outlines
+from tms_agents.slam.semidynamic.remains import remains
 from tms_agents.slam.semidynamic.shapes import surface
 from tms_agents.slam.semidynamic.solving import Stay
 
@@ -36,6 +37,7 @@ def draw(log: Log, poses: Floats, stays: Mapping[str, Sequence[Stay]], models: M
     points = [_static(log, poses, int(n), outlines) for n in scans]
     grid = grid_map(render(poses[scans], points, log.laser[:2], resolution, _REACH_M), 0)
     cells = grid.cells.copy()
+    cells[remains(grid, log, poses, scans, points)] = UNKNOWN
     for tag, found in stays.items():
         outline = surface(models.objects[tag], found[-1].pose)
         if found[-1].left or _gone(log, poses, found[-1], outline):
