@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
 from tms_agents.slam.geometry import Floats, transform
 from tms_agents.slam.gridmap import GridMap, grid_map, render
@@ -26,8 +27,9 @@ from tms_agents.slam.semidynamic.solving import Stay
 _OWN_M = 0.08
 #: Scans that are drawn: one every so much (m, rad).
 _STEP_M, _STEP_RAD, _REACH_M = 0.1, 0.1, 0.2
-#: What was not read any more has gone if so large a share of its outline was seen through by so many beams.
-_SEEN_THROUGH, _ENOUGH = 0.5, 4
+#: What was not read any more has gone if so large a share of its outline was seen through by so many beams, and more of
+#: it than was met.
+_SEEN_THROUGH, _ENOUGH = 0.3, 4
 
 
 def draw(log: Log, poses: Floats, stays: Mapping[str, Sequence[Stay]], models: Models, resolution: float) -> GridMap:
@@ -63,5 +65,6 @@ def _gone(log: Log, poses: Floats, last: Stay, outline: Floats) -> bool:
     place = Place.around(outline, 0.1)
     beams = count_beams(place, log, poses, later)
     at = ((outline - place.corner) / CELL_M).astype(int)
+    hits = maximum_filter(beams.hits, 3)[at[:, 1], at[:, 0]]
     through = beams.passes[at[:, 1], at[:, 0]] >= _ENOUGH * (1 + beams.hits[at[:, 1], at[:, 0]])
-    return float(through.mean()) > _SEEN_THROUGH
+    return float(through.mean()) > max(_SEEN_THROUGH, float((~through & (hits > 0)).mean()))
