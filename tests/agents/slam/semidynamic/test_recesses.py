@@ -8,7 +8,7 @@ import pytest
 from tms_agents.slam.geometry import Floats
 from tms_agents.slam.semidynamic.evidence import CELL_M, Beams, Worth, worth
 from tms_agents.slam.semidynamic.models import ObjectModel
-from tms_agents.slam.semidynamic.recesses import goes_on
+from tms_agents.slam.semidynamic.recesses import flanked, goes_on
 from tms_agents.slam.semidynamic.shapes import shape_of
 
 WIDTH, THICK = 0.7, 0.035
@@ -41,7 +41,7 @@ def share(depth: float, pose: Floats) -> float:
     """Of the wall that goes on past a door at ``pose``."""
     cells = seen_with(depth)
     return goes_on(
-        pose, SHAPE.outline, SHAPE.normals, SHAPE.beyond, SHAPE.hinged, cells.towards, cells.wall, cells.surface,
+        pose, SHAPE.outline, SHAPE.normals, SHAPE.beyond, cells.towards, cells.wall, cells.surface,
         np.zeros(2), CELL_M,
     )  # fmt: skip
 
@@ -90,3 +90,15 @@ def test_beams_that_end_before_a_wall_by_their_noise_are_the_walls() -> None:
     row = int(WALL_Y / CELL_M)
     assert cells.seen[row - 3 : row + 4, 20:140].max() < 0.02
     assert cells.always[row, 20:140].min() > 0.2
+
+
+@pytest.mark.parametrize(("depth", "expected"), [(-0.3, [0.0] * 4), (0.12, [0.0, 0.0, 1.0, 0.0])])
+def test_a_bin_before_a_wall_is_no_piece_of_it_and_one_whose_face_is_in_it_is(
+    depth: float, expected: list[float]
+) -> None:
+    box = 0.15 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    shape = shape_of(ObjectModel("bin_box", (box,), np.array([0.15, 0.0, 0.0])))
+    wall = np.zeros((100, 160), dtype=np.bool_)
+    wall[int(WALL_Y / CELL_M) - 2 : int(WALL_Y / CELL_M) + 3] = True
+    pose = np.array([2.0, WALL_Y + depth, np.pi])
+    assert [round(flanked(pose, ends, wall, np.zeros(2), CELL_M), 6) for ends in shape.beyond] == expected
