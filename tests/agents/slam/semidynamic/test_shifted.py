@@ -133,6 +133,19 @@ def test_of_a_nameless_thing_that_went_nothing_is_left_where_no_beam_passes_agai
     assert drawn(grid, sides(folder, 1, -1.0)) > 0.9
 
 
+def test_what_was_not_read_again_has_gone_though_its_far_sides_are_hidden(folder: Path) -> None:
+    log, truth, models = world(folder)
+    begins = float(log.t[legs_of(log.t) == 1][0])
+    stays = {
+        tag: [replace(found[0], visit=replace(found[0].visit, ends=begins))]
+        for tag, found in true_stays(folder, log).items()
+    }
+    # Beams that meet the near face of where a cabinet is now come from inside of where it was.
+    grid = draw(log, truth, stays, models, 0.02)
+    assert drawn(grid, sides(folder, 0, 1.0)) < 0.1
+    assert drawn(grid, sides(folder, 0, -1.0)) < 0.1
+
+
 def test_walls_stay_behind_what_was_moved_before_them(folder: Path) -> None:
     log, truth, models = world(folder)
     x = np.arange(1.5, LENGTH - 1.5, 0.02)
