@@ -13,9 +13,9 @@ from tms_agents.slam.semidynamic.models import ObjectModel
 from tms_agents.slam.semidynamic.scoring import Sight
 from tms_agents.slam.semidynamic.shapes import Shape
 
-_FROM_READS, _FROM_SURFACES = 2000, 8000
+_FROM_READS, _FROM_SURFACES = 2000, 16000
 #: One in so many is turned anyhow: tags that are turned away are read now and then, too.
-_TURNED = 4
+_TURNED = 8
 #: Cells that may be the object's (log-odds), the share that those count which are always occupied, how far away they
 #: may be (reaches of the antenna).
 _PROMISING, _WALLS, _REACHES = 0.1, 0.2, 1.3
