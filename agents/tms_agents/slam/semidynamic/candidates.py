@@ -7,13 +7,15 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tms_agents.slam.geometry import Floats, compose, inverse, wrapped
+from tms_agents.slam.geometry import Floats, compose, inverse, transform, wrapped
 from tms_agents.slam.semidynamic.evidence import CELL_M
 from tms_agents.slam.semidynamic.models import ObjectModel
 from tms_agents.slam.semidynamic.scoring import Sight
 from tms_agents.slam.semidynamic.shapes import Shape
 
-_FROM_READS, _FROM_SURFACES = 2000, 8000
+_FROM_READS, _FROM_SURFACES = 2000, 16000
+#: One in so many is turned anyhow: tags that are turned away are read now and then, too.
+_TURNED = 8
 #: Cells that may be the object's (log-odds), the share that those count which are always occupied, how far away they
 #: may be (reaches of the antenna).
 _PROMISING, _WALLS, _REACHES = 0.1, 0.2, 1.3
@@ -31,6 +33,7 @@ def candidates(
     rough = sight.score(model, shape, tried)
     best = tried[np.argsort(-rough, kind="stable")[: 4 * _REFINED]]
     poses = refined(sight, model, shape, _apart(best)[:_REFINED])
+    poses = np.concatenate([poses, *(_turned(poses, shape, quarters) for quarters in (1, 2, 3))])
     scores = sight.score(model, shape, poses)
     order = np.argsort(-scores, kind="stable")
     kept = _apart(poses[order])[:most]
@@ -82,10 +85,19 @@ def _from_surfaces(sight: Sight, model: ObjectModel, shape: Shape, random: np.ra
     antenna = seen_from[random.integers(len(seen_from), size=_FROM_SURFACES)]
     towards = np.arctan2(antenna[:, 1] - at[:, 1], antenna[:, 0] - at[:, 0])
     turn = towards - model.tag[2] + random.uniform(-1.4, 1.4, _FROM_SURFACES)
+    turn[: _FROM_SURFACES // _TURNED] = random.uniform(-np.pi, np.pi, _FROM_SURFACES // _TURNED)
     c, s = np.cos(turn), np.sin(turn)
     x = at[:, 0] - c * points[:, 0] + s * points[:, 1]
     y = at[:, 1] - s * points[:, 0] - c * points[:, 1]
     return np.stack([x, y, wrapped(turn)], axis=-1)
+
+
+def _turned(poses: Floats, shape: Shape, quarters: int) -> Floats:
+    """``poses`` (N, 3) turned about the middle of the outline, which may look alike then."""
+    middle = 0.5 * (shape.outline.min(axis=0) + shape.outline.max(axis=0))
+    turn = np.array([0.0, 0.0, 0.5 * np.pi * quarters])
+    back = transform(turn, -middle[None])[0] + middle
+    return compose(poses, np.broadcast_to([*back, turn[2]], poses.shape))
 
 
 def _readers(sight: Sight) -> Floats:

@@ -21,6 +21,8 @@ _SHARP_M, _ENOUGH = 0.03, 4.0
 #: What a point of an outline is worth (log-odds): seen, seen through, seen where there is always something.
 _SEEN, _THROUGH, _ALWAYS = 0.6, -1.2, 0.3
 _INSIDE = -0.5
+#: Cells where so small a share of the beams ended that did in one near them have none.
+_STRAYS = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,7 @@ def count_beams(place: Place, log: Log, poses: Floats, scans: NDArray[np.int64])
 
 def worth(now: Beams, other: Beams) -> Worth:
     """What cells say about an object; ``now``: beams while it stood there, ``other``: at all other times."""
+    now = _without_strays(now)
     near = maximum_filter(now.hits, 3)
     share = near / np.maximum(near + now.passes, 1)
     known = np.minimum((near + now.passes) / _ENOUGH, 1.0)
@@ -94,12 +97,27 @@ def worth(now: Beams, other: Beams) -> Worth:
     sharp = np.exp(-0.5 * (away * CELL_M / _SHARP_M) ** 2)
     towards = -now.course[nearest[0], nearest[1]]
     towards /= np.maximum(np.linalg.norm(towards, axis=-1, keepdims=True), 1e-9)
-    always = _always(other)
+    always = _always(other)[nearest[0], nearest[1]]
     seen = known * sharp * np.clip(2 * share, 0, 1)
     through = known * _THROUGH * np.clip(1 - 2.5 * share, 0, 1) * (1 - sharp)
     inside = _INSIDE * np.minimum(now.passes / _ENOUGH, 1.0) * np.clip(1 - 2 * share, 0, 1)
     wall = maximum_filter(always * sharp, 5) > 0.2
-    return Worth(_SEEN * (1 - always) * seen, _ALWAYS * always * seen, towards, through, inside, wall, _surface(now))
+    return Worth(
+        _SEEN * (1 - always) * seen,
+        _ALWAYS * always * seen,
+        towards,
+        through,
+        inside,
+        wall,
+        _surface(now)[nearest[0], nearest[1]],
+    )
+
+
+def _without_strays(beams: Beams) -> Beams:
+    """Without the few that ended short of where most of those did that met the same surface, or past it: of hundreds on
+    a wall some end where the face of a thing before it would be."""
+    kept = beams.hits >= _STRAYS * maximum_filter(beams.hits, 5)
+    return Beams(beams.hits * kept, beams.passes, beams.course * kept[..., None], beams.ends * kept[..., None])
 
 
 def _always(other: Beams) -> Floats:

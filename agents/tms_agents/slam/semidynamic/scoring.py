@@ -13,7 +13,7 @@ from tms_agents.slam.geometry import Floats, compose
 from tms_agents.slam.semidynamic.antenna import read_odds
 from tms_agents.slam.semidynamic.evidence import CELL_M, Place, Worth
 from tms_agents.slam.semidynamic.models import Antenna, ObjectModel
-from tms_agents.slam.semidynamic.recesses import goes_on
+from tms_agents.slam.semidynamic.recesses import flanked, goes_on
 from tms_agents.slam.semidynamic.shapes import Shape
 
 #: Nobody reads a tag through a wall: what is nowhere seen, but was read, costs so much.
@@ -51,8 +51,9 @@ class Sight:
         found = np.empty(len(poses))
         cells = self.cells
         _sums(
-            poses, shape.outline, shape.normals, shape.beyond, shape.inside, shape.hinged, cells.seen, cells.always,
-            cells.towards, cells.through, cells.inside, cells.wall, cells.surface, self.place.corner, CELL_M, found,
+            poses, shape.outline, shape.normals, shape.beyond, shape.edges, shape.inside, shape.hinged, cells.seen,
+            cells.always, cells.towards, cells.through, cells.inside, cells.wall, cells.surface, self.place.corner,
+            CELL_M, found,
         )  # fmt: skip
         if not self.was_read:
             return found
@@ -73,6 +74,7 @@ def _sums(
     outline: Floats,
     normals: Floats,
     beyond: Floats,
+    edges: NDArray[np.int64],
     inside: Floats,
     hinged: bool,
     seen: Floats,
@@ -102,14 +104,17 @@ def _sums(
                     facing = min(max(4.0 * (nx * towards[y, x, 0] + ny * towards[y, x, 1]), 0.0), 1.0)
                     total += seen[y, x] * facing
                     usual += always[y, x] * facing
+            last = m + 1 == outline.shape[0] or edges[m + 1] != edges[m]
+            if last and not hinged and usual > 0.0:
+                past = flanked(poses[n], beyond[edges[m]], wall, corner, cell) if edges[m] >= 0 else 0.0
+                total += usual * max(1.0 - 2.0 * past, 0.0)
+                usual = 0.0
         for m in range(inside.shape[0]):
             x = int((left + c * inside[m, 0] - s * inside[m, 1]) / cell)
             y = int((low + s * inside[m, 0] + c * inside[m, 1]) / cell)
             if 0 <= x < width and 0 <= y < height:
                 total += deep[y, x]
         if usual > 0.0:
-            past = goes_on(
-                poses[n], outline, normals, beyond, hinged, towards, wall, surface, corner, cell
-            )  # fmt: skip
+            past = goes_on(poses[n], outline, normals, beyond, towards, wall, surface, corner, cell)
             total += usual * max(1.0 - 2.0 * past, 0.0)
         found[n] = total

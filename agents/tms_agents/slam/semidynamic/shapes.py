@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tms_agents.slam.geometry import Floats, transform
 from tms_agents.slam.semidynamic.models import ObjectModel
@@ -17,12 +19,14 @@ _BEYOND_M, _EDGE_M = (0.10, 0.16, 0.22), 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """``outline`` (M, 2) with outward ``normals`` (M, 2), ``inside`` (I, 2), and ``beyond`` (B, 2) in line with the
-    edges but past their ends, m in the object's frame. What is ``hinged`` is a panel along x."""
+    """``outline`` (M, 2) with outward ``normals`` (M, 2), ``inside`` (I, 2), and ``beyond`` (E, 2, P, 2) in line with
+    E longer edges but past either end, m in the object's frame; ``edges`` (M,) on which of these a point of the outline
+    lies (-1: on none). What is ``hinged`` is a panel along x."""
 
     outline: Floats
     normals: Floats
     beyond: Floats
+    edges: NDArray[np.int64]
     inside: Floats
     hinged: bool
 
@@ -33,10 +37,17 @@ class Shape:
 
 
 def shape_of(model: ObjectModel) -> Shape:
-    edges = [_edges(part) for part in model.parts]
+    points, normals, edges = [], [], []
+    beyond: list[Floats] = []
+    for part in model.parts:
+        for on, outward, past in _edges(part):
+            points.append(on)
+            normals.append(np.broadcast_to(outward, on.shape))
+            edges.append(np.full(len(on), len(beyond) if past is not None else -1))
+            beyond += [past] if past is not None else []
     inside = np.concatenate([_inside(part) for part in model.parts])
-    outline, normals, beyond = (np.concatenate(one) for one in zip(*edges, strict=True))
-    return Shape(outline, normals, beyond, inside, model.hinged)
+    ends = np.array(beyond) if beyond else np.empty((0, 2, len(_BEYOND_M), 2))
+    return Shape(np.concatenate(points), np.concatenate(normals), ends, np.concatenate(edges), inside, model.hinged)
 
 
 def surface(model: ObjectModel, pose: Floats) -> Floats:
@@ -44,21 +55,17 @@ def surface(model: ObjectModel, pose: Floats) -> Floats:
     return transform(pose, shape_of(model).outline)
 
 
-def _edges(corners: Floats) -> tuple[Floats, Floats, Floats]:
-    """Points on the edges of a polygon, outward normals there, points past the ends of edges."""
+def _edges(corners: Floats) -> Iterator[tuple[Floats, Floats, Floats | None]]:
+    """Of each edge of a polygon: points on it, its outward normal, and if it is long, points past either end."""
     following = np.roll(corners, -1, axis=0)
     area = float(np.sum(corners[:, 0] * following[:, 1] - following[:, 0] * corners[:, 1]))
-    points, normals, beyond = [], [], [np.empty((0, 2))]
     for a, b in zip(corners, following, strict=True):
         length = max(float(np.hypot(*(b - a))), 1e-9)
         steps = max(1, round(length / STEP_M))
-        points.append(a + (b - a) * ((np.arange(steps) + 0.5) / steps)[:, None])
+        points = a + (b - a) * ((np.arange(steps) + 0.5) / steps)[:, None]
         outward = np.array([b[1] - a[1], a[0] - b[0]]) / length * np.sign(area)
-        normals.append(np.broadcast_to(outward, (steps, 2)))
-        if length > _EDGE_M:
-            past = (b - a) / length * np.array(_BEYOND_M)[:, None]
-            beyond += [b + past, a - past]
-    return np.concatenate(points), np.concatenate(normals), np.concatenate(beyond)
+        past = (b - a) / length * np.array(_BEYOND_M)[:, None]
+        yield points, outward, np.stack([b + past, a - past]) if length > _EDGE_M else None
 
 
 def _inside(corners: Floats) -> Floats:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tms_agents.slam.geometry import Floats
-from tms_agents.slam.semidynamic.evidence import CELL_M, Beams, worth
+from tms_agents.slam.semidynamic.evidence import CELL_M, Beams, Worth, worth
 from tms_agents.slam.semidynamic.models import ObjectModel
-from tms_agents.slam.semidynamic.recesses import goes_on
+from tms_agents.slam.semidynamic.recesses import flanked, goes_on
 from tms_agents.slam.semidynamic.shapes import shape_of
 
 WIDTH, THICK = 0.7, 0.035
@@ -22,8 +22,8 @@ SHAPE = shape_of(MODEL)
 WALL_Y, FROM_X = 1.2, 1.5
 
 
-def share(depth: float, pose: Floats) -> float:
-    """Of the wall that goes on past a door at ``pose``, with a laser's noise."""
+def seen_with(depth: float) -> Worth:
+    """A wall with a door, ``depth`` behind it, which is always closed, with a laser's noise."""
     random = np.random.default_rng(3)
     x = random.uniform(0.3, 3.7, 20000)
     inside = (x > FROM_X) & (x < FROM_X + WIDTH)
@@ -34,10 +34,15 @@ def share(depth: float, pose: Floats) -> float:
     np.add.at(ends, (cells[:, 1], cells[:, 0]), points)
     course[..., 1] = hits
     beams = Beams(hits, np.zeros_like(hits), course, ends)
-    cells_worth = worth(beams, beams)
+    return worth(beams, beams)
+
+
+def share(depth: float, pose: Floats) -> float:
+    """Of the wall that goes on past a door at ``pose``."""
+    cells = seen_with(depth)
     return goes_on(
-        pose, SHAPE.outline, SHAPE.normals, SHAPE.beyond, SHAPE.hinged, cells_worth.towards, cells_worth.wall,
-        cells_worth.surface, np.zeros(2), CELL_M,
+        pose, SHAPE.outline, SHAPE.normals, SHAPE.beyond, cells.towards, cells.wall, cells.surface,
+        np.zeros(2), CELL_M,
     )  # fmt: skip
 
 
@@ -66,3 +71,34 @@ def test_half_on_the_door_it_is_a_piece_of_wall(along: float) -> None:
 def test_a_wall_seen_at_a_slant_stays_a_wall(turn: float) -> None:
     pose = closed(0.0) + np.array([0.0, -turn * WIDTH / 2, turn])
     assert share(0.0, pose) > 0.8
+
+
+@pytest.mark.parametrize("off", [-0.05, -0.03, 0.03, 0.05])
+@pytest.mark.parametrize("turn", [-0.08, 0.0, 0.08])
+def test_before_a_wall_or_behind_it_a_panel_is_a_piece_of_it(off: float, turn: float) -> None:
+    pose = closed(0.0) + np.array([0.0, off - turn * WIDTH / 2, turn])
+    assert share(0.0, pose) > 0.8
+
+
+def test_at_a_corner_a_piece_of_wall_is_still_a_piece_of_wall() -> None:
+    # A fifth of the panel lies where the wall ends and another one, which stands back, is met.
+    assert share(0.11, np.array([FROM_X - 0.8 * WIDTH, WALL_Y, 0.0])) > 0.45
+
+
+def test_beams_that_end_before_a_wall_by_their_noise_are_the_walls() -> None:
+    cells = seen_with(0.0)
+    row = int(WALL_Y / CELL_M)
+    assert cells.seen[row - 3 : row + 4, 20:140].max() < 0.02
+    assert cells.always[row, 20:140].min() > 0.2
+
+
+@pytest.mark.parametrize(("depth", "expected"), [(-0.3, [0.0] * 4), (0.12, [0.0, 0.0, 1.0, 0.0])])
+def test_a_bin_before_a_wall_is_no_piece_of_it_and_one_whose_face_is_in_it_is(
+    depth: float, expected: list[float]
+) -> None:
+    box = 0.15 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    shape = shape_of(ObjectModel("bin_box", (box,), np.array([0.15, 0.0, 0.0])))
+    wall = np.zeros((100, 160), dtype=np.bool_)
+    wall[int(WALL_Y / CELL_M) - 2 : int(WALL_Y / CELL_M) + 3] = True
+    pose = np.array([2.0, WALL_Y + depth, np.pi])
+    assert [round(flanked(pose, ends, wall, np.zeros(2), CELL_M), 6) for ends in shape.beyond] == expected
