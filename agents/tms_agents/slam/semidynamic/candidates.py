@@ -42,16 +42,27 @@ def candidates(
 
 def refined(sight: Sight, model: ObjectModel, shape: Shape, poses: Floats) -> Floats:
     """Each of ``poses`` (N, 3) moved uphill."""
-    moves = np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=float)
-    step = np.array([_STEPS[0], _STEPS[0], _STEPS[1]])
-    for _ in range(_HALVED):
+    middle = 0.5 * (shape.outline.min(axis=0) + shape.outline.max(axis=0))
+    for halved in range(_HALVED):
+        moves = _moves(middle, _STEPS[0] / 2**halved, _STEPS[1] / 2**halved)
         for _ in range(3):
-            around = (poses[:, None, :] + moves * step).reshape(-1, 3)
+            around = compose(np.repeat(poses, len(moves), axis=0), np.tile(moves, (len(poses), 1)))
             scores = sight.score(model, shape, around).reshape(len(poses), -1)
-            poses = poses + moves[np.argmax(scores, axis=1)] * step
-        step = step / 2
+            poses = around.reshape(len(poses), len(moves), 3)[np.arange(len(poses)), np.argmax(scores, axis=1)]
     poses[:, 2] = wrapped(poses[:, 2])
     return poses
+
+
+def _moves(middle: Floats, step: float, turn: float) -> Floats:
+    """Small moves (9, 3) of an object in its own frame: none, along its sides, turns about its origin and its middle.
+
+    Evidence is a ridge along a side that may lie anywhere on a wall, and about a corner that is met.
+    """
+    moves = [(0.0, 0.0, 0.0), (step, 0.0, 0.0), (-step, 0.0, 0.0), (0.0, step, 0.0), (0.0, -step, 0.0)]
+    for angle in (turn, -turn):
+        back = transform(np.array([0.0, 0.0, angle]), -middle[None])[0] + middle
+        moves += [(0.0, 0.0, angle), (back[0], back[1], angle)]
+    return np.array(moves)
 
 
 def _from_reads(sight: Sight, model: ObjectModel, random: np.random.Generator) -> Floats:

@@ -43,7 +43,7 @@ def test_where_it_stands_is_a_candidate_however_its_tag_is_turned(turn: float) -
     pose = np.array([0.2, 0.1, turn])
     found, _ = candidates(sight(pose), MODEL, shape_of(MODEL), np.random.default_rng(1))
     off = np.hypot(*(found[:, :2] - pose[:2]).T)
-    assert ((off < 0.15) & (np.abs(wrapped(found[:, 2] - turn)) < 0.15)).any()
+    assert ((off < 0.06) & (np.abs(wrapped(found[:, 2] - turn)) < 0.15)).any()
 
 
 def test_the_same_outline_with_the_tag_on_the_other_side_is_a_candidate() -> None:
