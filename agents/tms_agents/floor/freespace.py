@@ -262,15 +262,15 @@ def silent(
 
 @njit(cache=True)
 def guard(states: NDArray[np.int8], claimed: NDArray[np.bool_]) -> None:
-    """Extend ``claimed`` (n,) to the background beside it: at the edge of a thing before a wall a beam shows both."""
+    """Extend ``claimed`` (n,) to what is beside it: at the edge of a thing a beam shows a bit of what is behind, too."""
     n = states.size
     edge = -9
     for i in range(n):
         if claimed[i] and states[i] == FOREGROUND:
             for k in range(max(i - _GUARD, 0), i):
-                claimed[k] |= states[k] == BACKGROUND
+                claimed[k] |= states[k] == BACKGROUND or states[k] == FOREGROUND
             edge = i
-        elif i - edge <= _GUARD and states[i] == BACKGROUND:
+        elif i - edge <= _GUARD and (states[i] == BACKGROUND or states[i] == FOREGROUND):
             claimed[i] = True
 
 
