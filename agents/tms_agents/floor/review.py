@@ -20,7 +20,8 @@ NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
 _LONE_S = 4.0
 #: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer.
 _STEP_M = 0.1
-#: What had stood there for so long (s) before somebody's only foot came there is most likely a thing: time counts more.
+#: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
+#: likely a thing: time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
 #: Not even who has come step by step stands for so long (s) without shifting a foot.
 _STILL_S = 900.0
@@ -203,7 +204,7 @@ def review(
                 if body.older > _OLDER_S:
                     body.lone += dt * _FASTER
                 elif not behind:
-                    body.lone += dt
+                    body.lone += dt * (_FASTER if body.odd else 1.0)
             elif (
                 max(t - body.a_seen, t - body.b_seen) < 1.0
                 or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
