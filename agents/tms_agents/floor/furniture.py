@@ -59,7 +59,7 @@ def _goes_on(centre: Array, weight: Array, i: int, r: float) -> bool:
 
 @njit(cache=True)
 def _bridged(centre: Array, weight: Array, last: int, i: int, r: float, step: float) -> bool:
-    """Whether the beams between ``last`` and i end at something thin before the range r: what is behind is one piece."""
+    """Whether the beams between ``last`` and i end at something thin before the range r: behind it is one piece."""
     if i - last <= 2:
         return True
     if (i - last) * step * r > _HIDDEN_M:

@@ -29,7 +29,7 @@ _BESIDE_M, _STAYS_S = 0.2, 2.0
 _SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
 #: What still stands after so long (s) while the other foot goes may be no foot.
 _LEFT_S, _LEFT = 1.0, 0.5
-#: A foot lost sight of for so long (s) may be where it stood before, so near the other (m); its negative log likelihood.
+#: A foot lost sight of for so long (s) may be where it stood before, so near the other (m): negative log likelihood.
 _LOST_S, _STANCE_M, _AGAIN = 0.3, 0.5, 0.5
 #: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
 _ROLL_M, _ROLLED_M = 0.08, 0.17
