@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, together
 from tms_agents.floor.gait import SHOES
-from tms_agents.floor.prints import unlike_foot
 from tms_agents.floor.shine import unlike
 
 Array = NDArray[np.float64]
@@ -29,8 +28,6 @@ _BESIDE_M, _STAYS_S = 0.2, 2.0
 _SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
 #: What still stands after so long (s) while the other foot goes may be no foot.
 _LEFT_S, _LEFT = 1.0, 0.5
-#: A foot lost sight of for so long (s) may be where it stood before, so near the other (m): negative log likelihood.
-_LOST_S, _STANCE_M, _AGAIN = 0.3, 0.5, 0.5
 #: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
 _ROLL_M, _ROLLED_M = 0.08, 0.17
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
@@ -85,19 +82,6 @@ def waits(body: Any, c: Any) -> bool:
         return False
     a = body.a_seen >= 0.0 and np.hypot(c.x - body.ax, c.y - body.ay) < STAND_M
     return bool(a or (body.b_seen >= 0.0 and np.hypot(c.x - body.bx, c.y - body.by) < STAND_M))
-
-
-@njit(cache=True)
-def _stood(body: Any, q: Any, other: int, prints: Any, t: float) -> bool:
-    """Whether nobody's print q was a foot of the body while its ``other`` one, a print, stood where it stands now.
-
-    Somebody who passed closely has been taken for it meanwhile.
-    """
-    if other < 0 or q.owner >= 0 or q.given or q.whose != body.label or unlike_foot(body, q):
-        return False
-    p = prints[other]
-    both = max(p.rested, q.rested) < q.owned
-    return bool(both and t - p.last < _LOST_S and np.hypot(p.x - q.x, p.y - q.y) < _STANCE_M)
 
 
 @njit(cache=True)
@@ -218,10 +202,6 @@ def costs(
                 if age >= _FRESH_S and q.owner != rows[column]:
                     # What has stood there for long is hardly a foot, except that of somebody who stands.
                     value = min(value, step + 2.5)
-                    if gap > _LOST_S and not body.stale:
-                        beside = body.b_print if which == 0 else body.a_print
-                        if _stood(body, q, beside, prints, t):
-                            value = min(value, base + _AGAIN)
                 else:
                     value = min(value, step)
                     if speed > 0.35 and gap < 1.3 and t - other < 0.4:

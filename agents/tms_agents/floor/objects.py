@@ -42,8 +42,6 @@ _MUTES, _SELDOM = 10, 0.06
 #: Somebody lost sight of so near (m) may still stand there for so long (s), on two feet so near each other (m) that are
 #: seen again at the same time (within s).
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
-#: Who lacks a foot, for so long, and was seen so long ago at most (s), may have it so near (m).
-_LACKS_S, _BY_M = (0.3, 1.0), 0.8
 #: The same of somebody of whom one thing alone was seen that did not move.
 _NOWHERE_S = 8.0
 #: No foot looks narrower (m); as wide as this (m) is a shoe from its side.
@@ -121,25 +119,13 @@ def _weigh(things: Any, looks: Any, t: float, dt: float) -> int:
 
 
 @njit(cache=True)
-def _kept(q: Any, bodies: Any, t: float) -> bool:
-    """Whether the print was a foot of somebody beside it, who lacks one now: it may still be his."""
-    for b in range(bodies.size):
-        body = bodies[b]
-        if not body.used or body.label != q.whose or body.stale or t - body.seen > _LACKS_S[1]:
-            continue
-        lacks = max(t - body.a_seen, t - body.b_seen) > _LACKS_S[0]
-        return bool(lacks and t - q.first < _PART_S and np.hypot(body.x - q.x, body.y - q.y) < _BY_M)
-    return False
-
-
-@njit(cache=True)
 def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float) -> bool:
     """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, wide, or there are two.
 
     Where there are ``robots``, what stands behind something new, and is never seen whole, may be a part of one.
     """
     if q.given:
-        return _kept(q, bodies, t)
+        return False
     if robots and q.covered > _COVERED * q.hits and t - q.first < _PARKS_S:
         return True
     if t - q.first > _STANDS_S:

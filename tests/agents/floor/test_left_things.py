@@ -7,16 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tms_agents.floor import FloorSettings
 from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND
 from tms_agents.floor.freespace import guard
 from tms_agents.floor.furniture import Furniture
-from tms_agents.floor.likelihood import costs
-from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.prints import follow
 from tms_agents.floor.review import CONFIRM, NOTHING, review
 from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.state import BODY, PRINT, THING, empty
+from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0
 #: Something new stands right before a laser of three beams, so that nothing behind it is seen.
@@ -100,41 +97,3 @@ def test_nobody_begins_with_a_foot_that_came_beside_somebody_and_has_never_moved
     actions = np.zeros(2, np.int64)
     review(bodies, NOW, 0.1, *COVERED, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
     assert actions[1] == action
-
-
-def beside(**fields: float) -> tuple[np.ndarray, np.ndarray]:
-    """Somebody who stands on the first print, and whose other foot is not seen; he stood on the second, too."""
-    bodies, prints = empty(BODY, 1), empty(PRINT, 2)
-    prints["used"], prints["x"], prints["first"], prints["rested"] = 1, [2.0, 2.2], NOW - 60.0, NOW - 60.0
-    prints["last"], prints["owner"], prints["width"], prints["whose"] = NOW, [0, -1], 0.1, 7
-    prints["hits"] = prints["whole"] = prints["looks"] = 600
-    prints["owned"] = [NOW, NOW - 5.0]
-    for name, value in fields.items():
-        prints[name][1] = value
-    bodies["used"], bodies["confirmed"], bodies["label"], bodies["pp"] = 1, 1, 7, 0.01
-    bodies["x"] = bodies["ax"] = 2.0
-    bodies["bx"], bodies["seen"], bodies["a_seen"], bodies["b_seen"] = 2.4, NOW - 0.1, NOW - 0.1, NOW - 1.0
-    bodies["a_since"], bodies["b_since"] = NOW - 60.0, NOW - 4.0
-    bodies["b_print"], bodies["leg"] = -1, 0.1
-    return bodies, prints
-
-
-@pytest.mark.parametrize(
-    ("fields", "again"),
-    [({}, True), ({"whose": 8}, False), ({"given": 1}, False), ({"rested": NOW - 4.0}, False), ({"x": 2.8}, False)],
-)
-def test_who_stands_has_his_foot_back_when_who_was_taken_for_it_has_gone(fields: dict[str, float], again: bool) -> None:
-    bodies, prints = beside(**fields)
-    clusters = np.zeros(2, CLUSTER)
-    clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = prints["x"], 8, 0.1, 0.012
-    cost = np.zeros((2, 4))
-    which = np.arange(2)
-    costs(clusters, which, np.full((2, 4), np.nan), np.ones(2, np.bool_), prints, bodies, which[:1], NOW, cost)
-    assert bool(cost[1, 1] < cost[1, 3]) == again
-
-
-@pytest.mark.parametrize(("lacks", "told"), [(1.0, False), (0.0, True)])
-def test_what_was_somebodys_foot_is_no_thing_while_he_lacks_one(lacks: float, told: bool) -> None:
-    bodies, prints = beside(given=1, first=NOW - 3.0, rested=NOW - 3.0, beams=8, spacing=0.01, busy=NOW, silent=-1e9)
-    bodies["b_seen"] = NOW - lacks
-    assert Objects(empty(THING, 1), FloorSettings()).ripe(prints, bodies, NOW) == ([(1, OBJECT)] if told else [])
