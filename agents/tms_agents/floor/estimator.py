@@ -192,7 +192,7 @@ class FloorEstimator:
                 view.background.adopt(span, view.ranges[span], ADOPTED[q["revealed"]])
             elif somebodys[k] or (q["hits"] >= 3 and q["hits"] > 0.6 * q["looks"]):
                 view.claimed[beams] = True
-        guard(view.background.states, view.claimed)
+        guard(view.ranges, view.background.states, view.claimed)
 
     def _new_label(self) -> int:
         self._labels += 1

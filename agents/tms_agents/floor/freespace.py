@@ -33,8 +33,8 @@ _PROFILE, _SLANT, _CORNER = 6, 0.13, 0.25
 #: What is seen of a half hidden thing is known when the same of it has been met so often, and so many times more often
 #: than passed; how fast it follows; of what echoes less often it is not.
 _STEADY, _SELDOM, _PART, _ECHOES = 30, 3, 0.2, 0.8
-#: So many beams beside a thing do not show the background alone.
-_GUARD = 2
+#: So many beams beside a thing do not show the background alone; they show the thing at its range (m).
+_GUARD, _GOES_ON_M = 2, 0.1
 #: One thing as one scan sees it: the verdict, beams on it, where it seems to be and how wide, and whether all of it and
 #: nothing else was seen.
 LOOK = np.dtype(
@@ -261,17 +261,28 @@ def silent(
 
 
 @njit(cache=True)
-def guard(states: NDArray[np.int8], claimed: NDArray[np.bool_]) -> None:
-    """Extend ``claimed`` (n,) to the background beside it: at the edge of a thing before a wall a beam shows both."""
+def guard(ranges: Array, states: NDArray[np.int8], claimed: NDArray[np.bool_]) -> None:
+    """Extend ``claimed`` (n,) to what is beside it: at the edge of a thing a beam shows a bit of what is behind, too.
+
+    And where something thin stands before it, a beam shows now that, now the thing, ``ranges`` (n,) m.
+    """
     n = states.size
     edge = -9
     for i in range(n):
         if claimed[i] and states[i] == FOREGROUND:
             for k in range(max(i - _GUARD, 0), i):
-                claimed[k] |= states[k] == BACKGROUND
+                claimed[k] |= _belongs(ranges, states, k, i)
             edge = i
-        elif i - edge <= _GUARD and states[i] == BACKGROUND:
+        elif i - edge <= _GUARD and _belongs(ranges, states, i, edge):
             claimed[i] = True
+
+
+@njit(cache=True)
+def _belongs(ranges: Array, states: NDArray[np.int8], i: int, edge: int) -> bool:
+    """Whether beam i, beside a thing that ends at beam ``edge``, may show a bit of it."""
+    if states[i] == BEYOND:
+        return bool(abs(ranges[i] - ranges[edge]) < _GOES_ON_M)
+    return bool(states[i] == BACKGROUND or states[i] == FOREGROUND)
 
 
 @njit(cache=True)

@@ -25,8 +25,8 @@ _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 _THIN_WIDTH_M = 0.01
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
-#: The ranges of one surface differ so little from beam to beam (m).
-_SAME_M = 0.05
+#: The ranges of one surface differ so little from beam to beam (m); something thin hides so much of it (m).
+_SAME_M, _HIDDEN_M = 0.05, 0.15
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
 _GONE_S, _WEIGHT = 0.8, 0.25
 #: It cannot stand at its new place so long (s) before it is seen to have gone, unless who pushes it hides that.
@@ -58,6 +58,23 @@ def _goes_on(centre: Array, weight: Array, i: int, r: float) -> bool:
 
 
 @njit(cache=True)
+def _bridged(centre: Array, weight: Array, last: int, i: int, r: float, step: float) -> bool:
+    """Whether the beams between ``last`` and i end at something thin before the range r: behind it is one piece."""
+    if i - last <= 2:
+        return True
+    if (i - last) * step * r > _HIDDEN_M:
+        return False
+    for b in range(last + 1, i):
+        far = 0.0
+        for j in range(centre.shape[1]):
+            if weight[b, j] > _WEIGHT:
+                far = max(far, centre[b, j])
+        if far == 0.0 or far > r - _SAME_M:
+            return False
+    return True
+
+
+@njit(cache=True)
 def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: float, t: float, out: Array) -> int:
     """Group missing components of neighbouring beams to rows of ``out`` (m, 5), as `Piece`; how many."""
     n, k = centre.shape
@@ -70,8 +87,9 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
             for j in range(k):
                 if weight[i, j] > _WEIGHT and missing[i, j] > _GONE_S and (r == 0.0 or centre[i, j] < r):
                     r, seconds = centre[i, j], missing[i, j]
-        joined = r > 0.0 and beams > 0 and i - last <= 2 and abs(r - last_r) < 0.12
-        if beams > 0 and not joined and (r > 0.0 or i - last > 2 or i == n):
+        joined = r > 0.0 and beams > 0 and abs(r - last_r) < 0.12
+        joined = joined and _bridged(centre, weight, last, i, min(r, last_r), step)
+        if beams > 0 and not joined and (r > 0.0 or i == n or not _bridged(centre, weight, last, i, last_r, step)):
             if count < out.shape[0]:
                 out[count, 0] = t - gone / beams
                 out[count, 1], out[count, 2] = x / beams, y / beams

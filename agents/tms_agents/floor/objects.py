@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
+from tms_agents.floor.prints import HARDLY
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -166,7 +167,7 @@ def _plain(q: Any, age: float, t: float, rest_s: float) -> bool:
     # What is silent most of the time shows less of itself.
     seldom = t - q.silent < 1.0 and q.mutes >= _MUTES and q.hits > _SELDOM * (q.looks + q.mutes)
     quiet = seldom or (t - q.silent < 1.0 and q.hits >= 6)
-    hidden = q.whole == 0 and q.beams >= 2.0 and age > _SLIVER_S
+    hidden = q.hits > HARDLY * q.whole and q.beams >= 2.0 and age > _SLIVER_S
     if q.beams < 0.6 * 0.03 / max(q.spacing, 1e-3) and not quiet and not hidden:
         return False
     if q.beams < 1.5 and not seldom and (age < 2.0 * rest_s or q.hits < 0.75 * q.looks or q.hits < _SINGLE):

@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 
 #: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
 _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
-#: What had rested for so long (s) and comes out again so near (m, and per metre of range) and as wide (share, m) as it
-#: was is the same: no foot steps so exactly.
-_RESTED_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.02, 0.003, 0.25, 0.015
+#: What had rested for so long (s), or had been put there by hand for so long, and comes out again so near (m, and per
+#: metre of range) and as wide (share, m) as it was is the same: no foot steps so exactly.
+_RESTED_S, _GIVEN_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.5, 0.02, 0.003, 0.25, 0.015
 #: What fewer beams meet flickers at the edge of something.
 _SPECK = 1.5
 #: What has been seen for so long (s) is not a foot of somebody whom one lost sight of before.
@@ -25,7 +25,7 @@ _NOT_HIS_S = 1.0
 #: No foot is so wide (m).
 _WIDE_M = 0.3
 #: So many times more often seen than seen whole.
-_HARDLY = 8
+HARDLY = 8
 #: What is black or glossy echoes now and then: at least once in this time (s).
 _MUTE_S = 3.0
 #: The mean place of what does not move stays within this (m, and per metre of range).
@@ -45,7 +45,8 @@ def _same(q: Any, c: Any) -> bool:
         0.25 * q.width if c.cut else 0.0
     ):
         return False
-    return bool(q.last - q.rested > _RESTED_S and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
+    rested = q.last - q.rested > (_GIVEN_S if q.given else _RESTED_S)
+    return bool(rested and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
 
 
 @njit(cache=True)
@@ -129,7 +130,7 @@ def follow(
         q.attached += 0.15 * (c.attached - q.attached)
         q.sensor, q.first_beam, q.last_beam = sensor, c.first, c.last
         # What is black or glossy is hardly ever seen whole: all that is seen of it counts.
-        hardly = c.cut and (q.whole == 0 or (q.mutes > q.hits > _HARDLY * q.whole))
+        hardly = c.cut and (q.whole == 0 or q.hits > HARDLY * q.whole)
         if not c.cut or hardly:
             if not c.cut:
                 q.whole += 1

@@ -20,7 +20,8 @@ NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
 _LONE_S = 4.0
 #: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer.
 _STEP_M = 0.1
-#: What had stood there for so long (s) before somebody's only foot came there is most likely a thing: time counts more.
+#: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
+#: likely a thing: time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
 #: Not even who has come step by step stands for so long (s) without shifting a foot.
 _STILL_S = 900.0
@@ -43,6 +44,8 @@ _KNOWN = 200
 _STEPS, _BOTH = 3, 30
 #: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
 _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
+#: What somebody has put down is so near him (m), also when he has gone on for a moment.
+_PUT_M, _PUT_S = 1.2, 3.0
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 
@@ -68,6 +71,21 @@ def _is_lone(body: Any, t: float) -> bool:
 def _has_walked(body: Any) -> bool:
     """Whether it has come on two feet, step by step."""
     return bool(body.own_pace_n >= _STEPS and body.both >= _BOTH)
+
+
+@njit(cache=True)
+def _is_put(bodies: Any, b: int, t: float) -> bool:
+    """Whether one foot of a body not yet believed has never moved, and somebody was beside it: it may be a thing."""
+    body = bodies[b]
+    a = t - body.a_seen < 0.5 and body.a_since <= body.first
+    if not a and not (t - body.b_seen < 0.5 and body.b_since <= body.first):
+        return False
+    for o in range(bodies.size):
+        other = bodies[o]
+        person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < _PUT_S
+        if person and np.hypot(other.x - body.x0, other.y - body.y0) < _PUT_M:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -173,7 +191,7 @@ def review(
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
             if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= max(3.0, 0.45 * body.hits):
-                actions[b] = CONFIRM
+                actions[b] = NOTHING if _is_put(bodies, b, t) else CONFIRM
             continue
         if unseen == 0.0:
             only_a = body.a_seen >= body.b_seen
@@ -186,7 +204,7 @@ def review(
                 if body.older > _OLDER_S:
                     body.lone += dt * _FASTER
                 elif not behind:
-                    body.lone += dt
+                    body.lone += dt * (_FASTER if body.odd else 1.0)
             elif (
                 max(t - body.a_seen, t - body.b_seen) < 1.0
                 or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
