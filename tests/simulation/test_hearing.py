@@ -20,6 +20,7 @@ from tms_schemas.observation import (
     InventoryLabel,
     LabelAppeared,
     LabelVanished,
+    LoadChange,
     Observation,
     ObservationBatch,
     TagObserved,
@@ -74,7 +75,10 @@ def test_who_is_late_is_named_until_all_is_told(tmp_path: Path) -> None:
         assert late() == "agent cabinet-a is late: it has told of 0 things on its board, there are 1"
         agents.say("cabinet-a", appeared("cabinet-a/1", "cabinet"))
         assert late() == f"agent cabinet-a is late: it has not told of tag {MUG}"
-        assert late(Told(unread=frozenset({MUG}))) == "nobody"
+        untagged = Told(unread=frozenset({MUG}))
+        assert late(untagged) == "agent cabinet-a is late: it has not told what something weighs"
+        agents.say("cabinet-a", LoadChange(seq=0, observed_at=now, labels=["cabinet-a/1"], weight_g=320.0))
+        assert late(untagged) == "nobody"
         agents.say("cabinet-a", TagObserved(seq=0, observed_at=now, label="cabinet-a/1", tag=MUG))
         assert late() == "nobody"
 

@@ -105,7 +105,8 @@ def test_a_second_run_goes_on_with_map_and_body(tmp_path, config):
                 told, _ = agent(config(server.url, 0)).communicate(timeout=200)
                 assert "0 lost, 0 waiting" in told
                 assert len(poses(town)) == 1, run
-            assert town.maps.get("building").version >= 2 or "nothing changed" in told
+            # The same drive may end in the very map that is there, which makes no new version.
+            assert f"map building is at version {town.maps.get('building').version}\n" in told
         robot = agent(config(server.url, 0.01))  # asked to stop in the middle
         assert robot.stdout is not None
         assert "log: connected: drive.log" in robot.stdout.readline()
