@@ -33,6 +33,8 @@ _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
 #: In a door somebody may wait for so long (s).
 _WAITS_S = 25.0
+#: So long (s) after the room was learned, slivers of it are no things.
+_UNSETTLED_S = 30.0
 #: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
 _FORMAT = 5
 
@@ -138,6 +140,7 @@ class FloorEstimator:
             for other in self._views.values():
                 other.move(self._extrinsics.pose(other.index))
         vanished = objects.weigh(self._looks, bodies, t, dt)
+        self._tracks.stepped(objects.walked, t)
         movers = self._tracks.review(
             t,
             dt,
@@ -169,6 +172,9 @@ class FloorEstimator:
         known = t - q["first"] > started - self._settings.learn_s
         if kind != OBJECT:
             q["revealed"] = LOOKS
+            return []
+        # Who has stood there all the time was learned with the room, and shows an edge of himself when he shifts.
+        if started < self._settings.learn_s + _UNSETTLED_S and (q["beams"] < 2.0 or q["attached"] > 0.02):
             return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED
@@ -216,6 +222,7 @@ class FloorEstimator:
             "sensors": sensors,
             "association": self._association.save(),
             "absent": self._tracks.absent.save(),
+            "strides": self._tracks.strides,
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
@@ -254,6 +261,7 @@ class FloorEstimator:
                 view.move(tuple(saved["pose"]))
             self._association.restore(state["association"])
             self._tracks.absent.restore(state["absent"])
+            self._tracks.strides = [(float(t), float(x), float(y), float(u)) for t, x, y, u in state.get("strides", ())]
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}

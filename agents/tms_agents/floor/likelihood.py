@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, together
 from tms_agents.floor.gait import SHOES
+from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
 
 Array = NDArray[np.float64]
@@ -131,6 +132,8 @@ def costs(
             body = bodies[rows[column]]
             away = np.hypot(c.x - body.x, c.y - body.y)
             if body.stale and age > _FRESH_S and not waits(body, c):
+                continue
+            if of[i] >= 0 and lay_before(q, body):
                 continue
             if not body.confirmed and age > t - body.first + 0.25:
                 continue

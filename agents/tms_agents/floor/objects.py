@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
-from tms_agents.floor.prints import HARDLY
+from tms_agents.floor.prints import HARDLY, lay_before
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -33,6 +33,8 @@ _PARTS_M = 0.1
 _TRUST_M = 0.04
 #: What is nobody's foot for so long (s), though somebody is there, is a thing.
 _SPARE_S = 2.0
+#: A foot that has stood for so long (s) is one until he has been away from it for so long (s).
+_HIS_S, _LEFT_S = 20.0, 8.0
 #: One beam is believed after so many hits; what has never been seen whole after so long (s).
 _SINGLE, _PART_S = 10, 4.0
 #: So little is seen of what is hidden in part that it is believed after so long (s).
@@ -136,7 +138,8 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
         body = bodies[b]
         if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
             # Who was found to be nowhere but on this is hardly there.
-            nowhere = max(body.a_seen, body.b_seen) < 0.0 and t - q.first > _NOWHERE_S
+            since = q.rested if lay_before(q, body) else q.first
+            nowhere = max(body.a_seen, body.b_seen) < 0.0 and t - since > _NOWHERE_S
             if q.whole < 0.5 * q.hits and not nowhere:
                 return True
     if q.width < _FOOT_M:
@@ -229,10 +232,13 @@ def _ripe(
         broad = q.width > _BROAD_M and not robots
         if q.spread > (0.05 if broad else 0.03) or not _plain(q, age, t, rest_s):
             continue
-        alone = t - q.busy > alone_s or broad
+        # Where somebody has stood for long he may be thought to have stepped on something else.
+        his = q.owned - q.first > _HIS_S
+        gone_s, spare_s = (_LEFT_S, _LEFT_S) if his else (alone_s, _SPARE_S)
+        alone = t - q.busy > gone_s or broad
         given = q.given == 1 and age > (_PART_S if robots else 1.25 * rest_s)
-        nobodys = alone or given or astride or q.spare >= _SPARE_S
-        if not nobodys and (t - q.owned < alone_s or not _third(q, bodies, t, rest_s)):
+        nobodys = alone or given or astride or q.spare >= spare_s
+        if not nobodys and (t - q.owned < gone_s or not _third(q, bodies, t, rest_s)):
             continue
         if _somebodys(q, prints, j, bodies, robots, t):
             continue
@@ -255,6 +261,8 @@ class Objects:
         self.visitors: dict[int, dict[int, float]] = {}
         #: When there was a robot.
         self.robot_at = -math.inf
+        #: Which went by themselves in the last scan, nobody being near: when they were seen last, x, y (m).
+        self.walked: list[tuple[float, float, float]] = []
         self._ripe = np.zeros(0, np.int64)
 
     def weigh(self, looks: Any, bodies: Any, t: float, dt: float) -> list[FloorEvent]:
@@ -262,6 +270,7 @@ class Objects:
         waiting = _weigh(self.things, looks, t, dt)
         self._attend(bodies, t)
         events: list[FloorEvent] = []
+        self.walked = []
         if not waiting:
             return events
         due = (self.things["used"] == 1) & (self.things["free"] >= self._settings.free_s - 0.05)
@@ -270,6 +279,8 @@ class Objects:
             who = _candidates(self.visitors.pop(int(thing["label"]), {}))
             events.append(Vanished(t, int(thing["label"]), float(thing["seen"]), t, who))
             thing["used"] = 0
+            if not who:
+                self.walked.append((float(thing["seen"]), *_xy(thing)))
         return events
 
     def ripe(self, prints: Any, bodies: Any, t: float) -> list[tuple[int, int]]:

@@ -20,8 +20,12 @@ _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
 _RESTED_S, _GIVEN_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.5, 0.02, 0.003, 0.25, 0.015
 #: What fewer beams meet flickers at the edge of something.
 _SPECK = 1.5
+#: And what so many meet is something else.
+_GROWN = 4
 #: What has been seen for so long (s) is not a foot of somebody whom one lost sight of before.
 _NOT_HIS_S = 1.0
+#: Nor is what had been there for so long (s) when he was found not to stand on what is seen.
+_BEFORE_S = 2.0
 #: No foot is so wide (m).
 _WIDE_M = 0.3
 #: So many times more often seen than seen whole.
@@ -47,6 +51,12 @@ def _same(q: Any, c: Any) -> bool:
         return False
     rested = q.last - q.rested > (_GIVEN_S if q.given else _RESTED_S)
     return bool(rested and (c.cut or abs(c.width - q.width) < _AS_WIDE * q.width + _WIDTH_M))
+
+
+@njit(cache=True)
+def _grown(q: Any, c: Any) -> bool:
+    """Whether the cluster, all of it in view, is much more than the speck that was seen, whole, where it is."""
+    return bool(not c.cut and q.whole > 0 and q.mutes < q.hits and q.beams < _SPECK and c.n >= _GROWN)
 
 
 @njit(cache=True)
@@ -111,6 +121,8 @@ def follow(
             q.owner, q.whose, q.owned, q.busy, q.revealed, q.given, q.idle = -1, -1, -1e9, -1e9, 0, 0, 0.0
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
+        if _grown(q, c):
+            q.idle = 0.0
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
             q.first, q.rested = t, t
             q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
@@ -161,6 +173,13 @@ def follow(
                 q.looks += 1
             if t - max(q.last, q.silent) > _GONE_S:
                 q.used = 0
+
+
+@njit(cache=True)
+def lay_before(q: Any, body: Any) -> bool:
+    """Whether the print was there when the body was found to be nowhere but on what does not move: it is no foot."""
+    nowhere = body.stale and not body.robot and max(body.a_seen, body.b_seen) < 0.0
+    return bool(nowhere and q.rested < body.seen - _BEFORE_S)
 
 
 @njit(cache=True)

@@ -27,6 +27,8 @@ _OLDER_S, _FASTER = 1.0, 2.5
 _STILL_S = 900.0
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
+#: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
+_STOOD_S = 20.0
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
@@ -56,10 +58,13 @@ def _is_lone(body: Any, t: float) -> bool:
     if body.robot or body.wide > 0.6 or body.width > 0.2:
         return False
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)
-    if _has_walked(body) and body.older < _OLDER_S and not body.odd and apart < _STANCE_M:
+    a, b = t - body.a_seen, t - body.b_seen
+    # What was met beside one who stands may have been the foot of somebody who passes.
+    stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
+    both = apart < _STANCE_M or stood > _STOOD_S
+    if _has_walked(body) and body.older < _OLDER_S and not body.odd and both:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S)
-    a, b = t - body.a_seen, t - body.b_seen
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
     if body.still > _STILL_S or sliver:
         return True

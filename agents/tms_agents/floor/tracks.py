@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,8 @@ _RESTS_S = 2.0
 _OUT_M, _SPEED = 0.5, 0.9
 #: A foot that leaves lands so far away (m) within so long (s).
 _STRIDE_M, _STEPS_S = 1.2, 0.6
+#: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
+_SHIFT_M, _BY_ITSELF_S, _HITS = 0.35, 2.0, 5
 
 
 class Tracks:
@@ -51,6 +53,8 @@ class Tracks:
         self._region = Area([] if scene.region is None else [scene.region])
         self._robots = [tuple(sorted(size)) for size in scene.robots]
         self.absent = Absent(self._gates)
+        #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
+        self.strides: list[tuple[float, float, float, float]] = []
         self._actions = np.zeros(self.bodies.size, np.int64)
 
     def review(
@@ -83,6 +87,7 @@ class Tracks:
             bool(self._region.polygons),
             learned,
         )
+        self._believe_steps(t)
         self._association.rename(t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t)
         for index in np.flatnonzero(self._actions).tolist():
@@ -137,6 +142,21 @@ class Tracks:
                 away = math.hypot(body["x"] - x, body["y"] - y) > _STRIDE_M
                 return bool(away and not body["stale"] and t - body["seen"] < self._settings.stale_s)
         return False
+
+    def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
+        """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
+        self.strides += [(*one, t + _BY_ITSELF_S) for one in walked]
+
+    def _believe_steps(self, t: float) -> None:
+        """Who is new where a thing has gone by itself need not walk to be believed."""
+        self.strides = [stride for stride in self.strides if t < stride[3]]
+        for since, x, y, _ in self.strides:
+            for index, body in enumerate(self.bodies):
+                new = body["used"] and not body["confirmed"] and body["seen"] == t and body["from_furniture"] == 0
+                steps = body["first"] > since - _STEPS_S and body["hits"] >= _HITS and body["wide"] < 0.3
+                likely = body["score"] >= 0.45 * body["hits"]
+                if new and steps and likely and math.hypot(body["x"] - x, body["y"] - y) < _SHIFT_M:
+                    self._actions[index] = CONFIRM
 
     def _gone(self, index: int, t: float) -> list[FloorEvent]:
         body = self.bodies[index]

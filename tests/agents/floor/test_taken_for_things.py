@@ -1,0 +1,135 @@
+"""Feet and things that were taken for each other: what tells them apart later, and what no longer misleads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from floor_rooms import Circle, Room
+
+from tms_agents.floor import Appeared
+from tms_agents.floor.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.bodies import stuck
+from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.prints import follow, lay_before
+from tms_agents.floor.review import LOST, review
+from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.settings import FloorSettings
+from tms_agents.floor.state import BODY, PRINT, THING, empty
+from tms_agents.floor.strays import release
+
+NOW = 100.0
+#: All is seen as far as the wall; nothing is seen behind what is new.
+OPEN = (np.full(41, 5.0), np.full(41, BACKGROUND, np.int8), np.full(41, 5.0), np.zeros(3), -1.0, 0.05)
+COVERED = (np.full(3, 0.5), np.full(3, FOREGROUND, np.int8), np.full(3, 5.0), np.zeros(3), -0.05, 0.05)
+
+
+def test_what_goes_by_itself_was_a_foot() -> None:
+    """Somebody nobody saw come stands there, is taken for two things, and shifts his feet."""
+
+    def feet(t: float) -> list[Circle]:
+        if t < 12.0:
+            return []
+        one = (2.2, 2.0, 0.05) if t < 45.0 else (2.3, 2.12, 0.05)
+        other = (2.3, 2.35, 0.05) if t < 46.0 else (2.2, 2.42, 0.05)
+        return [one, other]
+
+    estimator, before = Room(feet).play(44.0)
+    assert {event.kind for event in before if isinstance(event, Appeared)} == {"object"}
+    estimator, events = Room(feet).play(55.0, estimator, start=44.0)
+    assert [event.kind for event in events if isinstance(event, Appeared)] == ["mover"]
+    assert [one.kind for one in estimator.labels() if not one.stale] == ["mover"]
+
+
+@pytest.mark.parametrize(("ago", "where"), [(0.1, None), (0.4, (3.4, 1.8, NOW - 0.4))])
+def test_who_has_gone_on_from_what_he_put_down_left_with_the_foot_that_is_gone(
+    ago: float, where: tuple[float, float, float] | None
+) -> None:
+    (body,) = empty(BODY, 1)
+    body["ax"], body["ay"], body["a_seen"], body["a_since"] = 3.4, 1.8, NOW - ago, NOW - 5.0
+    body["b_seen"], body["b_since"] = NOW, NOW - 2.0
+    found = stuck(body, NOW)
+    assert found == (None if where is None else pytest.approx(where))
+
+
+def seen(prints: np.ndarray, t: float, beams: int, cut: int = 0) -> None:
+    clusters = np.zeros(1, CLUSTER)
+    clusters["x"], clusters["width"], clusters["near"], clusters["n"] = 1.0, 0.005 * beams, 1.0, beams
+    clusters["spacing"], clusters["mirror"], clusters["cut"] = 0.005, -1, cut
+    follow(clusters, np.zeros(1, np.int64), prints, 0, t, *COVERED)
+
+
+@pytest.mark.parametrize(("beams", "cut", "idle"), [(20, 0, 0.0), (20, 1, 3.0), (2, 0, 3.0)])
+def test_a_shoe_that_comes_where_a_speck_was_has_not_been_there(beams: int, cut: int, idle: float) -> None:
+    prints = empty(PRINT, 1)
+    for k in range(40):
+        seen(prints, 0.1 * k, 1)
+    prints["idle"] = 3.0
+    seen(prints, 4.0, beams, cut)
+    assert prints["idle"][0] == idle
+
+
+def lost(since: float) -> tuple[np.ndarray, np.ndarray]:
+    """Somebody who was found 20 s ago to stand nowhere, and what has been half in view again for 5 s where he was."""
+    bodies, prints = empty(BODY, 1), empty(PRINT, 1)
+    bodies["used"] = bodies["confirmed"] = bodies["stale"] = 1
+    bodies["seen"], bodies["a_seen"], bodies["b_seen"] = NOW - 20.0, -1e9, -1e9
+    values = {"used": 1, "first": NOW - 5.0, "rested": NOW - since, "last": NOW, "width": 0.08, "owner": -1}
+    values |= {"hits": 80, "looks": 80, "whole": 10, "beams": 8, "spacing": 0.01, "whose": -1}
+    values |= {"owned": -1e9, "busy": -1e9, "silent": -1e9}
+    for name, value in values.items():
+        prints[name] = value
+    return bodies, prints
+
+
+@pytest.mark.parametrize(("since", "thing"), [(40.0, True), (15.0, False)])
+def test_what_was_there_when_somebody_was_found_to_be_nowhere_is_no_foot_of_his(since: float, thing: bool) -> None:
+    bodies, prints = lost(since)
+    assert lay_before(prints[0], bodies[0]) == thing
+    told = Objects(empty(THING, 1), FloorSettings()).ripe(prints, bodies, NOW)
+    assert told == ([(0, OBJECT)] if thing else [])
+
+
+@pytest.mark.parametrize(("stood", "lost"), [(60.0, False), (5.0, True)])
+def test_who_has_stood_for_long_has_not_stepped_to_where_somebody_passes(stood: float, lost: bool) -> None:
+    """His other foot, behind the first, seems to be half a metre away for a moment."""
+    bodies = empty(BODY, 1)
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["own_pace_n"], bodies["both"], bodies["hits"], bodies["quality"] = 5, 200, 500, 1.0
+    bodies["x"], bodies["ax"], bodies["bx"] = 2.0, 2.0, 2.55
+    bodies["told_x"] = 2.0
+    bodies["a_land"] = bodies["a_since"] = NOW - stood
+    bodies["b_land"], bodies["b_seen"] = NOW - 1.0, NOW - 0.8
+    actions = np.zeros(1, np.int64)
+    found = []
+    for k in range(80):
+        bodies["seen"] = bodies["a_seen"] = t = NOW + 0.1 * k
+        review(bodies, t, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+        found.append(int(actions[0]))
+    assert (LOST in found) == lost
+
+
+@pytest.mark.parametrize(("owned", "thing"), [(30.0, False), (2.0, True)])
+def test_where_somebody_stood_for_long_he_is_waited_for(owned: float, thing: bool) -> None:
+    prints = empty(PRINT, 1)
+    values = {"used": 1, "first": NOW - owned - 4.0, "rested": NOW - owned - 4.0, "last": NOW, "width": 0.08}
+    values |= {"owner": -1, "whose": 1, "owned": NOW - 4.0, "busy": NOW - 4.0, "silent": -1e9}
+    values |= {"hits": 300, "looks": 300, "whole": 300, "beams": 8, "spacing": 0.01}
+    for name, value in values.items():
+        prints[name] = value
+    told = Objects(empty(THING, 1), FloorSettings()).ripe(prints, empty(BODY, 1), NOW)
+    assert told == ([(0, OBJECT)] if thing else [])
+
+
+@pytest.mark.parametrize(("idle", "given"), [(0.0, 0), (5.0, 1)])
+def test_the_foot_of_another_is_not_put_there(idle: float, given: int) -> None:
+    """Who seems to stand with one foot where somebody else stood all the time, or where a thing lay."""
+    bodies, prints = empty(BODY, 1), empty(PRINT, 2)
+    prints["used"], prints["first"], prints["last"], prints["width"] = 1, [NOW - 30.0, NOW - 30.0], NOW, 0.1
+    prints["hits"] = prints["whole"] = prints["looks"] = 30
+    prints["idle"] = [0.0, idle]
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["bx"], bodies["a_seen"], bodies["b_seen"] = 0.6, NOW, NOW
+    bodies["a_land"], bodies["b_land"] = NOW - 30.0, NOW - 8.0
+    bodies["a_print"], bodies["b_print"] = 0, 1
+    assert release(bodies, prints, NOW) == 1
+    assert prints["given"].tolist() == [0, given]
