@@ -174,7 +174,8 @@ class FloorEstimator:
             q["revealed"] = LOOKS
             return []
         # Who has stood there all the time was learned with the room, and shows an edge of himself when he shifts.
-        if started < self._settings.learn_s + _UNSETTLED_S and (q["beams"] < 2.0 or q["attached"] > 0.02):
+        sliver = q["attached"] > 0.02 or (q["beams"] < 2.0 and not q["given"])
+        if sliver and started < self._settings.learn_s + _UNSETTLED_S:
             return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED
