@@ -21,6 +21,8 @@ _DOOR_M = 1.0
 _SOMEBODY = 30
 #: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s).
 _AWAY_M, _SPEED, _WAIT_S = 1.0, 1.0, 20.0
+#: So near (m) where he was lost he may stand, since so long (s) before that at most.
+_STEPS_M, _JUST_S = 1.2, 4.0
 #: Who looks and walks as unlikely as this (log likelihood) is somebody else.
 _UNLIKE = -4.0
 
@@ -63,6 +65,14 @@ class Absent:
             if gap < 1.0 and likely > _UNLIKE and cost < best_cost:
                 best, best_cost = index, cost
         return None if best is None else self._bodies.pop(best)
+
+    def stands(self, print_: Any) -> bool:
+        """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost."""
+        return any(
+            print_["rested"] > one["seen"] - _JUST_S
+            and math.hypot(print_["x"] - one["x"], print_["y"] - one["y"]) < _STEPS_M
+            for one in self._bodies
+        )
 
     def gone(self, t: float) -> list[FloorEvent]:
         """Those who did not turn up."""

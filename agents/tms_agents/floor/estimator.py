@@ -175,7 +175,8 @@ class FloorEstimator:
             return []
         # Who has stood there all the time was learned with the room, and shows an edge of himself when he shifts.
         sliver = q["attached"] > 0.02 or (q["beams"] < 2.0 and not q["given"])
-        if sliver and started < self._settings.learn_s + _UNSETTLED_S:
+        unsettled = sliver and started < self._settings.learn_s + _UNSETTLED_S
+        if unsettled or (not q["given"] and self._tracks.absent.stands(q)):
             return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED

@@ -10,7 +10,7 @@ from tms_agents.floor.absent import Absent
 from tms_agents.floor.events import Vanished
 from tms_agents.floor.masks import Area
 from tms_agents.floor.shine import expected
-from tms_agents.floor.state import BODY, empty
+from tms_agents.floor.state import BODY, PRINT, empty
 
 DOOR = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
 
@@ -86,3 +86,13 @@ def test_who_is_waited_for_is_so_after_a_restart(absent: Absent) -> None:
 def test_nobody_is_saved_too(absent: Absent) -> None:
     absent.restore(absent.save())
     assert absent.gone(1e6) == []
+
+
+@pytest.mark.parametrize(("away", "since", "stands"), [(0.5, 12.0, True), (0.5, 2.0, False), (3.0, 12.0, False)])
+def test_what_came_where_somebody_was_lost_may_be_his_foot(
+    absent: Absent, away: float, since: float, stands: bool
+) -> None:
+    absent.keep(person(4.0, 4.0))
+    (print_,) = empty(PRINT, 1)
+    print_["x"], print_["y"], print_["rested"] = 4.0 + away, 4.0, since
+    assert absent.stands(print_) == stands
