@@ -232,6 +232,7 @@ def test_a_robot_that_restarts_is_opened_again_and_odometry_goes_on() -> None:
             st.integers(0, 150), st.integers(0, 60), st.sampled_from(["flip", "drop", "insert"]), st.integers(1, 255)
         ),
         max_size=40,
+        unique_by=lambda harm: harm[0],  # two errors in one packet may cancel out in its sum
     )
 )
 def test_no_damage_on_the_line_moves_the_robot(harm: list[tuple[int, int, str, int]]) -> None:

@@ -251,7 +251,8 @@ def test_a_recorded_scan_of_a_device_that_was_set_up(shared_data):
 
 
 KINDS = st.sampled_from(["flip", "drop", "insert"])
-damage = st.lists(st.tuples(st.integers(0, 25), st.integers(0, 800), KINDS, st.integers(1, 255)), max_size=4)
+HARM = st.tuples(st.integers(0, 25), st.integers(0, 800), KINDS, st.integers(1, 255))
+damage = st.lists(HARM, max_size=4, unique_by=lambda harm: harm[0])
 
 
 @settings(deadline=None, max_examples=12)

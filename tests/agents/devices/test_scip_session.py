@@ -307,6 +307,7 @@ def test_the_emulator_hears_anything(model, said):
             st.integers(1, 255),
         ),
         max_size=12,
+        unique_by=lambda harm: harm[0],  # two errors in one answer may cancel out in its sum
     )
 )
 def test_a_disturbed_line_gives_true_scans_or_none(harm):

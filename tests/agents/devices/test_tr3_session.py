@@ -177,6 +177,7 @@ damage = st.lists(
         st.integers(0, 60), st.integers(0, 200), st.sampled_from(["flip", "drop", "insert"]), st.integers(1, 255)
     ),
     max_size=12,
+    unique_by=lambda harm: harm[0],  # two errors in one answer may cancel out in its sum
 )
 
 
