@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from tms_agents.cabinet.balance import Balance, search
-from tms_agents.cabinet.blocks import Blocks
+from tms_agents.cabinet.blocks import Block, Blocks
 from tms_agents.cabinet.bookkeeping import Bookkeeper
 from tms_agents.cabinet.caution import IN_HAND_S, Caution
 from tms_agents.cabinet.episodes import Outcome
@@ -103,26 +103,10 @@ class CabinetEstimator:
             return []
         if done is None:
             return []
-        block, samples = done
-        self._noise.learn(block, samples)
-        level = self._detector.level
-        near = level.known and float(np.abs(block.mean - level.mean).max()) < _NEAR_G
-        self._wobble.hear(float(block.variance.mean()) * block.n, block.end - block.start)
-        self._wobble.push(t, block.mean, block.variance, near)
-        block.variance = block.variance + self._wobble.variance
-        if self._interrupted is not None:
-            self._drifted(block.start - self._interrupted)
-            self._interrupted = None
-        self._balance.shaking = self._wobble.shaking
-        step = self._detector.push(block)
-        if not self._detector.resting:
-            self._hindsight.changing(block, self._detector.level)
-        if step is not None:
-            return self._explain(step)
-        if self._detector.resting and t - self._looked > 0.5:
-            self._looked = t
-            return self._rest(t)
-        return []
+        events: list[CabinetEvent] = []
+        for block in self._noise.learn(*done):
+            events += self._take_block(block)
+        return events
 
     def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[CabinetEvent]:
         """Take one completed round of one antenna zone; an empty set means that nothing was read.
@@ -151,6 +135,11 @@ class CabinetEstimator:
         return self._blocks.unusable
 
     @property
+    def knows_load(self) -> bool:
+        """Whether the load at rest is known, so that whatever changes is told; half a second or so after the start."""
+        return self._detector.level.known
+
+    @property
     def noise_sd_g(self) -> Array:
         """Standard deviation of a single sample of each cell at the moment, (k,) g; NaN until it is known."""
         return self._noise.sd_g
@@ -164,6 +153,28 @@ class CabinetEstimator:
     def resting(self) -> bool:
         """Whether the load is steady and everything about it told."""
         return self._detector.resting and not self._blocks.unusable
+
+    # --- block by block
+
+    def _take_block(self, block: Block) -> list[CabinetEvent]:
+        t, level = block.end, self._detector.level
+        near = level.known and float(np.abs(block.mean - level.mean).max()) < _NEAR_G
+        self._wobble.hear(float(block.variance.mean()) * block.n, block.end - block.start)
+        self._wobble.push(t, block.mean, block.variance, near)
+        block.variance = block.variance + self._wobble.variance
+        if self._interrupted is not None:
+            self._drifted(block.start - self._interrupted)
+            self._interrupted = None
+        self._balance.shaking = self._wobble.shaking
+        step = self._detector.push(block)
+        if not self._detector.resting:
+            self._hindsight.changing(block, self._detector.level)
+        if step is not None:
+            return self._explain(step)
+        if self._detector.resting and t - self._looked > 0.5:
+            self._looked = t
+            return self._rest(t)
+        return []
 
     # --- at rest
 

@@ -45,7 +45,8 @@ def _device(device: dict[str, Any], kind: str, columns: int, colour: bool) -> st
     rest = why if state != "connected" else ""
     if kind == "board":
         known = [one["grams"] for one in device["cells"]]
-        rest = rest or ("no load yet" if None in known else f"{sum(known):.0f} g")
+        load = "no load yet" if None in known else f"{sum(known):.0f} g"
+        rest = rest or (load if device["knows_load"] else f"{load}, learning what rests on it")
     else:
         read = "; ".join(f"{zone}: {', '.join(tags) or 'nothing'}" for zone, tags in device["zones"].items())
         rest = rest or read or "no round yet"

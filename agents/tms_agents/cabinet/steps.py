@@ -23,8 +23,6 @@ from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.steady import average, chi_square_limit, restlessness, steady_tail
 
 _CHANGING_BLOCKS = 1000
-#: Blocks that a level needs to begin with.
-_LEAST_BLOCKS = 4
 #: Blocks remembered before a change.
 _HISTORY_BLOCKS = 75
 #: Loudness is judged for so many blocks at a time, knowing so many before and after them.
@@ -129,11 +127,24 @@ class StepDetector:
         self._recent.append(block)
         self._resting_blocks += 1
         self._judge(self._recent)
-        if self.level.known and self._departed():
+        if not (self.level.known or self._begin()) or self._departed():
             return
         lag = min(self._settings.level_lag_s / self._settings.block_s, self._resting_blocks / 2)
         while len(self._recent) > max(lag, 1) and self._recent[0].sharp is not None:
             self.level.add(self._recent.popleft())
+
+    def _begin(self) -> bool:
+        """The first two blocks that agree are a level: what follows may be a change already."""
+        while len(self._recent) > 2:
+            first, second = self._recent[0], self._recent[1]
+            apart = (first.mean - second.mean) ** 2 / (first.variance + second.variance)
+            self._recent.popleft()
+            if apart.max() < self._settings.departure_sd**2:
+                self._recent.popleft()
+                self.level.add(first)
+                self.level.add(second)
+                return True
+        return False
 
     def _departed(self) -> bool:
         blocks = list(self._recent)

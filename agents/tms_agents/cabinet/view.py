@@ -34,6 +34,7 @@ def _board(board: Board, cabinet: Cabinet, now: float) -> dict[str, Any]:
         "width": section.width,
         "depth": section.depth,
         "state": _state(board.state),
+        "knows_load": board.estimator.knows_load,
         "cells": [{"xy": xy, "grams": one} for xy, one in zip(cells, grams, strict=True)],
         "stays": [
             {

@@ -16,6 +16,7 @@ from tms_agents.cabinet.calibration_file import read_calibration
 from tms_agents.cabinet.config import CabinetConfig
 from tms_agents.cabinet.runner import run
 from tms_agents.config import read_config
+from tms_agents.live import socket_path, views
 from tms_agents.running import Posted
 from tms_client import Town
 from tms_schemas.agents import AgentView
@@ -110,6 +111,10 @@ class Rig:
         self.town, self.name, self.config = town, name, config
 
     @property
+    def socket(self) -> Path:
+        return socket_path(read_config(self.config, CabinetConfig).spool.path)
+
+    @property
     def agent_name(self) -> str:
         return f"{self.name}-cabinet"
 
@@ -138,9 +143,13 @@ class Rig:
         """Wait until the devices deliver and the agent knows the empty board."""
         for device in devices:
             await self.state("connected", device)
-        await asyncio.sleep(1.0)
+        async with asyncio.timeout(20.0), contextlib.aclosing(views(self.socket)) as shown:
+            async for view in shown:
+                if all(board["knows_load"] for board in view["boards"]):
+                    break
+        await asyncio.sleep(1.0)  # and knows it well
 
-    async def count(self, labels: int, timeout_s: float = 10.0) -> dict[str, LabelView]:
+    async def count(self, labels: int, timeout_s: float = 20.0) -> dict[str, LabelView]:
         """Wait until the server has so many labels."""
         found = await self.labels()
         try:

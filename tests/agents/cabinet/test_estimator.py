@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tms_agents.cabinet import (
     Appeared,
@@ -69,6 +71,33 @@ class Bench:
 
 def of(kind: type, events: list[CabinetEvent]) -> list:
     return [event for event in events if isinstance(event, kind)]
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(4, 12),
+    st.lists(st.floats(0.0, 3.0), min_size=4, max_size=40),
+)
+def test_what_is_put_right_after_the_start_is_weighed_whole(seed: int, before: int, gaps: list[float]) -> None:
+    """Two blocks of samples at rest are enough, also where the computer was busy and samples came late."""
+    rng = np.random.default_rng(seed)
+    estimator = CabinetEstimator(GEOMETRY, zones=ZONES)
+    t, events = 0.0, []
+    for i in range(before + 60):
+        load = 500 * share(0.1, 0.2) if i >= before else np.zeros(4)
+        events += estimator.load(t, load + rng.normal(0.0, 0.5, 4))
+        t += 0.1 + (gaps[i // 2] if i % 2 and i // 2 < len(gaps) else 0.0)
+    (appeared,) = of(Appeared, events)
+    assert abs(appeared.weight_g - 500) < 5
+
+
+def test_the_load_is_known_soon_after_the_start() -> None:
+    estimator = CabinetEstimator(GEOMETRY, zones=ZONES)
+    rng, known = np.random.default_rng(1), []
+    for i in range(60):
+        estimator.load(i * 0.02, rng.normal(0.0, 0.5, 4))
+        known.append(estimator.knows_load)
+    assert known == sorted(known) and not known[10] and known[40]
 
 
 @pytest.mark.parametrize("grams", [25, 60, 300, 2000])

@@ -144,6 +144,7 @@ def view(boards: int = 1, stays: int = 2, events: int = 40) -> dict[str, object]
     ]
     state = {"state": "faulty", "why": "shelf: board /dev/serial/by-id/usb-with-a-very-long-name-that-goes-on-and-on"}
     board = {"name": "shelf", "width": 0.4, "depth": 0.3, "state": state, "cells": cells, "stays": on_board}
+    board["knows_load"] = True
     reader = {"name": "r", "state": {"state": "connected", "why": ""}, "zones": {"shelf": ["E00401004E17F97A"] * 9}}
     at = "2026-11-21T10:00:00.000+00:00"
     return {"agent": "a", "room": "居間", "source": "agent", "at": at} | {
@@ -166,3 +167,11 @@ def test_a_screen_shows_what_matters():
     for wanted in ("faulty", "#1", "#2", "100 g", "97A", "event 39", "居間", "?"):
         assert wanted in picture
     assert "\x1b[31mfaulty" in "\n".join(screen(view(), colour=True))
+
+
+def test_a_screen_says_that_a_board_is_learning():
+    learning = view()
+    board = learning["boards"][0]
+    board |= {"knows_load": False, "state": {"state": "connected", "why": ""}}
+    board["cells"] = [{"xy": (0, 0), "grams": 10.0}]
+    assert "connected  10 g, learning what rests on it" in "\n".join(screen(learning))
