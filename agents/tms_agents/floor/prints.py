@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.freespace import FREE, clear, silent
+from tms_agents.floor.freespace import FREE, WALLED, clear, silent
 from tms_agents.floor.gait import SHOES
 
 Array = NDArray[np.float64]
@@ -57,6 +57,13 @@ def _same(q: Any, c: Any) -> bool:
 def _grown(q: Any, c: Any) -> bool:
     """Whether the cluster, all of it in view, is much more than the speck that was seen, whole, where it is."""
     return bool(not c.cut and q.whole > 0 and q.mutes < q.hits and q.beams < _SPECK and c.n >= _GROWN)
+
+
+@njit(cache=True)
+def _passed(q: Any, ranges: Array) -> bool:
+    """Whether the beams that met the print end behind it now."""
+    passed = ranges[q.first_beam : q.last_beam + 1]
+    return bool(np.isfinite(passed).all() and (passed > q.near + _STATIC_M).all())
 
 
 @njit(cache=True)
@@ -168,10 +175,13 @@ def follow(
                 q.mutes += 1
             if t - q.last > _MUTE_S:
                 q.used = 0
-        elif clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step) == FREE:
-            if sensor == q.sensor:
+        else:
+            view = clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step)
+            # In the gap between two walls only the beam that met it tells that it is not there now.
+            passed = view == WALLED and q.beams < _SPECK and sensor == q.sensor and _passed(q, ranges)
+            if (view == FREE and sensor == q.sensor) or passed:
                 q.looks += 1
-            if t - max(q.last, q.silent) > _GONE_S:
+            if view == FREE and t - max(q.last, q.silent) > _GONE_S:
                 q.used = 0
 
 

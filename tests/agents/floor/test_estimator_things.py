@@ -161,3 +161,21 @@ def test_a_thing_beside_a_leg_of_a_table_that_hides_a_part_of_it_for_ever_is_fou
     _, events = room.play(40.0)
     (put,) = born(events, "object")
     assert math.hypot(put.xy[0] - 2.5, put.xy[1] - 2.5) < 0.06
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_beam_in_the_gap_between_two_walls_shows_no_thing(seed: int) -> None:
+    """It ends at this wall or that, or nowhere; now and then, by chance, twice at the same place between them."""
+    room, gap, rng = Room(), 270, np.random.default_rng(seed)
+    (sensor,) = room.sensors.values()
+    estimator, events = FloorEstimator(room.sensors), []
+    between = {300, 327, 354, 363, 372}
+    for k in range(400):
+        ranges = cast(sensor, (), WALLS)
+        ranges[gap - 40 : gap], ranges[gap + 1 : gap + 40] = 2.0, 1.0
+        chance = rng.random()
+        ranges[gap] = np.inf if chance < 0.22 or k + 1 in between else 3.9 if chance < 0.85 else 1.0
+        if k in between:
+            ranges[gap] = 3.0
+        events += estimator.scan("A", 0.1 * k, ranges + rng.normal(0.0, 0.004, ranges.size))
+    assert events == []
