@@ -27,6 +27,8 @@ _BESIDE_M, _STAYS_S = 0.2, 2.0
 #: Negative log likelihood: of a foot seen just now being somewhere else, of having landed where something stood
 #: before, of swinging while the other foot swings.
 _SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
+#: What was his foot so long (s) ago may be again: something flickered beside it.
+_LATELY_S = 0.5
 #: What still stands after so long (s) while the other foot goes may be no foot.
 _LEFT_S, _LEFT = 1.0, 0.5
 #: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
@@ -149,6 +151,7 @@ def costs(
                 # Part of it may be hidden, but what is narrow and all in view is somebody's foot.
                 cost[i, 2 * column] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > 0.6 * body.width else 6.0)
                 continue
+            lately = of[i] >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
             speed = np.hypot(body.vx, body.vy)
             base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
             shape = unlike(body, marks[i])
@@ -199,10 +202,10 @@ def costs(
                 elif gap > 1.0:
                     # It must be somewhere.
                     step -= 1.0
-                if age > gap + 0.15:
+                if age > gap + 0.15 and not lately:
                     # Whatever stands here came while this foot was somewhere else.
                     step += _STOLEN
-                if age >= _FRESH_S and q.owner != rows[column]:
+                if age >= _FRESH_S and q.owner != rows[column] and not lately:
                     # What has stood there for long is hardly a foot, except that of somebody who stands.
                     value = min(value, step + 2.5)
                 else:

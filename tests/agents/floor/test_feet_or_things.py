@@ -81,6 +81,22 @@ def test_nobody_begins_by_a_step_that_is_too_long(away: float, may_step: bool) -
     assert bool(cost[0, :2].min() < UNLIKELY) == may_step
 
 
+def test_what_was_his_foot_a_moment_ago_may_be_again() -> None:
+    """A speck beside it was taken for the foot in one scan; what stood there all the time is no stranger's."""
+    bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 2), np.zeros(1, CLUSTER)
+    bodies["used"] = bodies["confirmed"] = bodies["b_print"] = 1
+    bodies["label"], bodies["a_print"], bodies["pp"] = 3, -1, 0.01
+    bodies["seen"], bodies["b_seen"], bodies["a_seen"] = NOW - 0.1, NOW - 0.1, NOW - 5.0
+    prints["used"], prints["owner"], prints["whose"], prints["owned"] = 1, -1, -1, -1e9
+    prints["first"], prints["last"], prints["hits"] = NOW - 4.0, NOW, 40
+    clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.06, 12, 0.12, 0.01
+    one, cost = np.zeros(1, np.int64), np.zeros((2, 1, 3))
+    for label, each in zip((7, 3), cost, strict=True):
+        prints["whose"], prints["owned"] = label, NOW - 0.1
+        costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, NOW, each)
+    assert cost[1, 0, 0] < cost[0, 0, 0] - 2.0
+
+
 def test_what_is_left_in_a_door_is_told_when_who_left_it_is_elsewhere() -> None:
     """He puts it at his feet, so that it might be one of them, and goes on into the room."""
     door = [(3.9, 1.0), (5.0, 1.0), (5.0, 3.0), (3.9, 3.0)]
