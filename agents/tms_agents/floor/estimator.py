@@ -16,11 +16,12 @@ from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects, candidates, near_movers
+from tms_agents.floor.own_feet import exchange
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
-from tms_agents.floor.shine import measure
+from tms_agents.floor.shine import measure, note
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.strays import release
 from tms_agents.floor.tracks import Tracks
@@ -125,15 +126,17 @@ class FloorEstimator:
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
-        marks = self._marks[:feet]
+        marks = self._marks[: clusters.size]
         increment_s = view.sensor.sweep.time_increment_s
-        measure(clusters[:feet], view.ranges, lights, increment_s, self._association.scattered, marks)
+        measure(clusters, view.ranges, lights, increment_s, self._association.scattered, marks)
+        note(prints, clusters, of, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
-        somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks, prints, t, view.sight)
+        somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
         if recognize(bodies, *self._robots):
             self._association.decide()
         attend(prints, bodies, t, dt)
-        if release(bodies, prints, t):
+        scattered = self._association.scattered
+        if exchange(bodies, prints, t, scattered) + release(bodies, prints, t):
             self._association.decide()
         count_feet(prints, bodies, t, dt)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
@@ -151,7 +154,7 @@ class FloorEstimator:
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:
-            for index, kind in objects.ripe(prints, bodies, t):
+            for index, kind in objects.ripe(prints, bodies, t, scattered):
                 appeared += self._settle(index, kind, t)
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
+from tms_agents.floor.own_feet import may_be_his
 from tms_agents.floor.prints import HARDLY, lay_before
 from tms_agents.floor.settings import FloorSettings
 
@@ -206,6 +207,7 @@ def _ripe(
     rest_s: float,
     alone_s: float,
     width_m: float,
+    scattered: Array,
     ripe: NDArray[np.int64],
 ) -> int:
     """Prints that are an `OBJECT` or `FURNITURE` by now, into ``ripe``; how many."""
@@ -224,6 +226,8 @@ def _ripe(
             continue
         # What somebody put down may touch a wall.
         leans = age > (_LEANS_S if t - q.busy < alone_s else _JOINED_S if q.width < width_m else 0.0)
+        if not astride and q.given == 0 and may_be_his(q, prints, bodies, t, scattered):
+            continue
         if q.attached > 0.5 and q.given == 0:
             if leans:
                 ripe[j] = FURNITURE
@@ -283,15 +287,26 @@ class Objects:
                 self.walked.append((float(thing["seen"]), *_xy(thing)))
         return events
 
-    def ripe(self, prints: Any, bodies: Any, t: float) -> list[tuple[int, int]]:
-        """Prints that rest, and what each is: `OBJECT` or `FURNITURE`."""
+    def ripe(self, prints: Any, bodies: Any, t: float, scattered: Array) -> list[tuple[int, int]]:
+        """Prints that rest, and what each is: `OBJECT` or `FURNITURE`.
+
+        ``scattered`` (3,) is what `shine.scatter` has learned.
+        """
         if (bodies["used"] & bodies["machine"]).any():
             self.robot_at = t
         s = self._settings
         if self._ripe.size != prints.size:
             self._ripe = np.zeros(prints.size, np.int64)
         if not _ripe(
-            prints, bodies, t - self.robot_at < _ROBOTS_S, t, s.rest_s, s.alone_s, s.object_width_m, self._ripe
+            prints,
+            bodies,
+            t - self.robot_at < _ROBOTS_S,
+            t,
+            s.rest_s,
+            s.alone_s,
+            s.object_width_m,
+            scattered,
+            self._ripe,
         ):
             return []
         return [(j, int(self._ripe[j])) for j in np.flatnonzero(self._ripe).tolist()]

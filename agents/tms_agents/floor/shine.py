@@ -29,6 +29,8 @@ _TURNS, _PRIOR, _LONG = 0.08, 40.0, 3000.0
 _BEST, _STEADY = 0.1, 0.03
 #: Whose shoes were seen so often has a look; somebody else so near (m) may be mistaken for him.
 _KNOWN, _ALONE_M = 120, 0.8
+#: A print that was seen so often is known, and as bright as somebody's feet up to so many standard deviations.
+_OFTEN, ALIKE = 5, 2.5
 
 
 def expected() -> Array:
@@ -64,6 +66,34 @@ def measure(
         if count > 0:
             marks[k, 0] = total / count
             marks[k, 1] = scattered[0] * (_PATCHES**2 + _BEAM**2 / count)
+
+
+@njit(cache=True)
+def note(prints: Any, clusters: Any, of: NDArray[np.int64], marks: Array) -> None:
+    """Remember how bright each of ``prints`` is, from the ``marks`` (m, 4) of the clusters (m,) ``of`` (m,) them."""
+    for k in range(clusters.size):
+        if of[k] < 0:
+            continue
+        q = prints[of[k]]
+        if q.hits == 1:
+            q.shine_n = 0
+        if (not clusters[k].cut or clusters[k].n > 1) and not np.isnan(marks[k, 0]):
+            q.shine_n = min(q.shine_n + 1, _MEMORY)
+            q.shine += (marks[k, 0] - q.shine) / q.shine_n
+
+
+@njit(cache=True)
+def strangeness(body: Any, q: Any, scattered: Array) -> float:
+    """How many standard deviations the print differs in brightness from the feet of the body; NaN: who knows."""
+    if body.own_n < _KNOWN or q.shine_n < _OFTEN:
+        return float(np.nan)
+    return float(abs(q.shine - body.own) / np.sqrt(scattered[1] + scattered[0] * _PATCHES**2))
+
+
+@njit(cache=True)
+def alike(body: Any, q: Any, scattered: Array) -> bool:
+    """Whether the print is as bright as the feet of the body, as far as is known of both."""
+    return bool(strangeness(body, q, scattered) < ALIKE)
 
 
 @njit(cache=True)

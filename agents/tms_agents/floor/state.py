@@ -14,7 +14,7 @@ import numpy as np
 #: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), whose (label
 #: of the last one, until owned), busy (when a body was last near),
 #: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
-#: revealed (`furniture.LOOKS`, `furniture.MOVED`),
+#: revealed (`furniture.LOOKS`, `furniture.MOVED`), how bright it is (`shine.measure`) and of how many sightings,
 #: beams of the last sighting.
 PRINT = np.dtype(
     [
@@ -47,6 +47,8 @@ PRINT = np.dtype(
         ("still_x", "f8"),
         ("still_y", "f8"),
         ("still", "f8"),
+        ("shine", "f8"),
+        ("shine_n", "i8"),
         ("sensor", "i8"),
         ("first_beam", "i8"),
         ("last_beam", "i8"),

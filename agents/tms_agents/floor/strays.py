@@ -40,7 +40,7 @@ def _stray(body: Any, prints: Any, t: float) -> int:
 
 
 @njit(cache=True)
-def _nobodys(q: Any, landed: float) -> int:
+def nobodys(q: Any, landed: float) -> int:
     """1 unless the print had been somebody else's foot all the time before a foot ``landed`` there."""
     return 0 if landed - q.first > _IDLE_S and q.idle < _IDLE_S else 1
 
@@ -58,11 +58,11 @@ def release(bodies: Any, prints: Any, t: float) -> int:
             continue
         count += 1
         if stray == 1:
-            prints[body.a_print].given = _nobodys(prints[body.a_print], body.a_land)
+            prints[body.a_print].given = nobodys(prints[body.a_print], body.a_land)
             body.a_print, body.a_seen = -1, body.b_land
             body.ax, body.ay = body.bx, body.by
         else:
-            prints[body.b_print].given = _nobodys(prints[body.b_print], body.b_land)
+            prints[body.b_print].given = nobodys(prints[body.b_print], body.b_land)
             body.b_print, body.b_seen = -1, body.a_land
             body.bx, body.by = body.ax, body.ay
         body.x, body.y = body.ax, body.ay

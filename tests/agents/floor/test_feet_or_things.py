@@ -12,6 +12,7 @@ from tms_agents.floor import Appeared, FloorSettings, Scene
 from tms_agents.floor.likelihood import UNLIKELY, costs
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
 from tms_agents.floor.strays import release
 
@@ -33,7 +34,7 @@ def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
 def told(prints: np.ndarray, *, robots: bool = False) -> bool:
     objects = Objects(empty(THING, 1), FloorSettings())
     objects.robot_at = NOW - 10.0 if robots else -math.inf
-    return objects.ripe(prints, empty(BODY, 1), NOW) == [(0, OBJECT)]
+    return objects.ripe(prints, empty(BODY, 1), NOW, expected()) == [(0, OBJECT)]
 
 
 def test_what_is_as_wide_as_a_shoe_from_its_side_waits() -> None:

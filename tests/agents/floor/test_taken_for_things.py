@@ -14,6 +14,7 @@ from tms_agents.floor.prints import follow, lay_before
 from tms_agents.floor.review import LOST, review
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.settings import FloorSettings
+from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
 from tms_agents.floor.strays import release
 
@@ -85,7 +86,7 @@ def lost(since: float) -> tuple[np.ndarray, np.ndarray]:
 def test_what_was_there_when_somebody_was_found_to_be_nowhere_is_no_foot_of_his(since: float, thing: bool) -> None:
     bodies, prints = lost(since)
     assert lay_before(prints[0], bodies[0]) == thing
-    told = Objects(empty(THING, 1), FloorSettings()).ripe(prints, bodies, NOW)
+    told = Objects(empty(THING, 1), FloorSettings()).ripe(prints, bodies, NOW, expected())
     assert told == ([(0, OBJECT)] if thing else [])
 
 
@@ -116,7 +117,7 @@ def test_where_somebody_stood_for_long_he_is_waited_for(owned: float, thing: boo
     values |= {"hits": 300, "looks": 300, "whole": 300, "beams": 8, "spacing": 0.01}
     for name, value in values.items():
         prints[name] = value
-    told = Objects(empty(THING, 1), FloorSettings()).ripe(prints, empty(BODY, 1), NOW)
+    told = Objects(empty(THING, 1), FloorSettings()).ripe(prints, empty(BODY, 1), NOW, expected())
     assert told == ([(0, OBJECT)] if thing else [])
 
 
