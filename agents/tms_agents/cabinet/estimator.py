@@ -103,10 +103,7 @@ class CabinetEstimator:
             return []
         if done is None:
             return []
-        events: list[CabinetEvent] = []
-        for block in self._noise.learn(*done):
-            events += self._take_block(block)
-        return events
+        return [event for block in self._noise.learn(*done) for event in self._take_block(block)]
 
     def inventory(self, t: float, zone: str, tags: frozenset[str]) -> list[CabinetEvent]:
         """Take one completed round of one antenna zone; an empty set means that nothing was read.
