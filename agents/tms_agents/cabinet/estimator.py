@@ -45,8 +45,6 @@ _SETTLED_SURE, _SETTLED_S = 0.98, 2.5
 _CARRIED = 0.1
 #: A gap in the samples may be a board without power, whose zeros then jump by about so much.
 _JUMP_G = 6.0
-#: A block so near the resting level tells how much it wobbles.
-_NEAR_G = 50.0
 
 
 class CabinetEstimator:
@@ -154,11 +152,7 @@ class CabinetEstimator:
     # --- block by block
 
     def _take_block(self, block: Block) -> list[CabinetEvent]:
-        t, level = block.end, self._detector.level
-        near = level.known and float(np.abs(block.mean - level.mean).max()) < _NEAR_G
-        self._wobble.hear(float(block.variance.mean()) * block.n, block.end - block.start)
-        self._wobble.push(t, block.mean, block.variance, near)
-        block.variance = block.variance + self._wobble.variance
+        self._wobble.take(block, self._detector.level)
         if self._interrupted is not None:
             self._drifted(block.start - self._interrupted)
             self._interrupted = None
@@ -168,9 +162,9 @@ class CabinetEstimator:
             self._hindsight.changing(block, self._detector.level)
         if step is not None:
             return self._explain(step)
-        if self._detector.resting and t - self._looked > 0.5:
-            self._looked = t
-            return self._rest(t)
+        if self._detector.resting and block.end - self._looked > 0.5:
+            self._looked = block.end
+            return self._rest(block.end)
         return []
 
     # --- at rest

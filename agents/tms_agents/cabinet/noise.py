@@ -22,6 +22,8 @@ from tms_agents.cabinet.settings import EstimatorSettings
 _RECENT, _MEDIAN_BIAS = 7, 0.94
 #: The same for the bends of the block means, and how large they must be to be more than chance.
 _BENDS, _BEND_BIAS, _SHAKING = 9, 0.8, 1.8
+#: Variance of a block of which nothing is known, g^2.
+_UNKNOWN_G2 = 100.0
 
 
 class Noise:
@@ -79,6 +81,10 @@ class Noise:
         blocks = [block for block, _ in self._waiting]
         rows = [self._floored(squares) for _, squares in self._waiting if squares]
         self._waiting.clear()
+        if not rows:  # never three samples in a row: nobody knows the noise
+            for block in blocks:
+                block.variance = block.unit = np.full(len(block.mean), _UNKNOWN_G2)
+            return blocks
         floor = self._settings.noise_floor_g**2
         self._variance = [max(sorted(one)[len(one) // 2] / _MEDIAN_BIAS, floor) for one in zip(*rows, strict=True)]
         for row in rows:

@@ -13,8 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tms_agents.cabinet.baseline import Level
+from tms_agents.cabinet.blocks import Block
 from tms_agents.cabinet.geometry import Array
 
+#: A block so near the resting level tells how much it wobbles.
+_NEAR_G = 50.0
 #: Blocks of one mean, means that are averaged for each scale, bends in the running median and least number of them.
 _GROUP, _SCALES, _BENDS, _LEAST = 4, (1, 2), 14, 4
 #: Median of such a mean of squares relative to its mean, the same for one cell alone, how large one must be to be more
@@ -29,7 +33,7 @@ _SHAKING, _NOW_S, _QUIET_S = 1.3, 6.0, 900.0
 
 
 class Wobble:
-    """``push`` blocks; ``variance`` (k,) g^2 is to be added to that of every block."""
+    """``take`` blocks, one by one; ``variance`` (k,) g^2 is what is added to that of every block."""
 
     def __init__(self, cells: int) -> None:
         self.variance: Array = np.zeros(cells)
@@ -43,6 +47,13 @@ class Wobble:
     def shaking(self) -> bool:
         """Whether a compressor, say, shakes the board: its tones may also be where no average removes them."""
         return self._now > _SHAKING * self._quiet > 0.0
+
+    def take(self, block: Block, level: Level) -> None:
+        """Learn from a block, and add to its variance what wobbles."""
+        near = level.known and float(np.abs(block.mean - level.mean).max()) < _NEAR_G
+        self.hear(float(block.variance.mean()) * block.n, block.end - block.start)
+        self.push(block.end, block.mean, block.variance, near)
+        block.variance = block.variance + self.variance
 
     def hear(self, noise: float, seconds: float) -> None:
         """The variance of a sample over some time, g^2."""

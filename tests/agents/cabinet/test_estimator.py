@@ -91,6 +91,17 @@ def test_what_is_put_right_after_the_start_is_weighed_whole(seed: int, before: i
     assert abs(appeared.weight_g - 500) < 5
 
 
+@pytest.mark.parametrize("every", [2, 3, 4, 5, 9])
+def test_samples_that_are_missing_from_the_start_on_stop_nothing(every: int) -> None:
+    estimator, rng, events = CabinetEstimator(GEOMETRY, zones=ZONES), np.random.default_rng(every), []
+    for i in range(300):
+        load = 500 * share(0.1, 0.2) if i >= 150 else np.zeros(4)
+        values = load + rng.normal(0.0, 0.5, 4)
+        events += estimator.load(0.1 * i, np.full(4, np.nan) if i < 100 and i % every == 0 else values)
+    (appeared,) = of(Appeared, events)
+    assert abs(appeared.weight_g - 500) < 5
+
+
 def test_the_load_is_known_soon_after_the_start() -> None:
     estimator = CabinetEstimator(GEOMETRY, zones=ZONES)
     rng, known = np.random.default_rng(1), []
