@@ -55,7 +55,8 @@ class Senses(Protocol):
 class Player:
     """One world and its sensors; ``speed`` room seconds pass in one second of the clock.
 
-    While a script waits for the agents the room stands still: devices take their own time.
+    While a script waits for the agents the room stands still: devices take their own time. So it does while the
+    machine has no time for it.
     """
 
     def __init__(
@@ -93,16 +94,20 @@ class Player:
             CommandError: an agent is late; the message names it.
         """
         self._set_clocks()
-        due = self._monotonic()
         for wish in script:
             if wish is None:
-                self.world.step(STEP_S)
-                self._look()
-                due += STEP_S / self._speed
-                self._sleep(max(0.0, due - self._monotonic()))
+                self._step()
             else:
                 self._wait(wish)
-                due = self._monotonic()
+
+    def _step(self) -> None:
+        # Counted from now, not from when it was due: after a stall nobody makes up for it in leaps, which a laser
+        # would take for somebody who vanished and somebody else who came.
+        until = self._monotonic() + STEP_S / self._speed
+        self._set_clocks()
+        self.world.step(STEP_S)
+        self._look()
+        self._sleep(max(0.0, until - self._monotonic()))
 
     def _wait(self, wish: Told | Firm) -> None:
         starting = isinstance(wish, Told) and wish.connected
@@ -124,5 +129,5 @@ class Player:
             self._senses.floor(found)
 
     def _set_clocks(self) -> None:
-        """The room stands still between two scripts, clocks do not; they never go back."""
+        """The room stands still now and then, clocks do not; they never go back."""
         self._anchor = (max(self.now, self._clock()), self.world.time_s)
