@@ -12,11 +12,16 @@ from pathlib import Path
 import httpx
 import pytest
 from fastapi import FastAPI
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parent.parent
 
 # One cache of compiled kernels for all tests and the servers they start. Before numba is imported.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".tms" / "compiled"))
+
+# No test is about time: a busy computer takes long for anything.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 
 @pytest.fixture(scope="session")

@@ -186,7 +186,7 @@ ACTION = st.one_of(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.integers(0, 1), st.floats(-5, 5), ACTION), max_size=40))
 def test_whatever_two_hands_do_the_events_fit_each_other(actions):
     """As the server sees it: labels appear once, exist while named, are never used again; times never go back."""

@@ -48,7 +48,7 @@ def test_drains_in_order_in_batches(fake, town, spool):
 
 
 @given(bad=st.sets(st.integers(0, 29)), names=st.booleans(), most=st.integers(1, 40), batch=st.integers(1, 40))
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_bad_items_never_block_the_others(fake, town, tmp_path_factory, bad, names, most, batch):
     """Whichever items the server refuses, named or not, however small its bodies: the rest arrives in order."""
     fake.records.clear()

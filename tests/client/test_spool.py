@@ -116,7 +116,7 @@ STEPS = st.lists(st.sampled_from(["put", "put2", "ack", "bury", "agree", "reopen
 
 
 @given(steps=STEPS)
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_in_order_and_never_twice(steps, tmp_path_factory):
     """Whatever the sequence of calls: what leaves was put in, in order, under rising numbers; labels are unique."""
     path = tmp_path_factory.mktemp("spool") / "s"

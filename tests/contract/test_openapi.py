@@ -44,7 +44,7 @@ def test_no_surprises(database_url: str, tmp_path: Path, mode: GenerationMode) -
 
 
 def exercise(operation: schemathesis.APIOperation, mode: GenerationMode) -> None:
-    @settings(max_examples=20, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=20, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(case=operation.as_strategy(generation_mode=mode))
     def check(case: schemathesis.Case) -> None:
         case.call_and_validate(checks=CHECKS)

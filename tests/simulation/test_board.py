@@ -292,7 +292,7 @@ def test_what_is_impossible_is_refused_and_changes_nothing() -> None:
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_a_household_leaves_on_the_board_what_its_changes_say(seed: int) -> None:
     parameters = replace(BoardParameters(), electronics=CellParameters(**IDEAL))
     world = BoardWorld(parameters, np.random.default_rng(seed))

@@ -27,7 +27,7 @@ def swept(drawing: Drawing, pose: Any = (0.0, 0.0, 0.0), increment_s: float = 0.
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-3, 3), st.floats(-3, 3), st.floats(0.5, 4))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_in_a_round_room_every_beam_ends_on_the_wall(theta: float, x: float, y: float, radius: float) -> None:
     far = radius + math.hypot(x, y) + 0.1
     drawing = Drawing()
@@ -41,7 +41,7 @@ def test_in_a_round_room_every_beam_ends_on_the_wall(theta: float, x: float, y: 
 
 
 @given(st.floats(0.2, 6), st.floats(-2.2, 2.2), st.floats(0.01, 0.15))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_a_leg_is_met_by_the_beams_within_its_width_and_nothing_else(r: float, bearing: float, radius: float) -> None:
     drawing = Drawing()
     drawing.circle((r * math.cos(bearing), r * math.sin(bearing)), radius, owner=3)

@@ -12,7 +12,7 @@ from tms_agents.simulation.building import Drive, drive
 from tms_agents.simulation.tours import drawn_plan
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10_000), length=st.floats(100.0, 3000.0))
 def test_the_way_keeps_to_corridors_that_all_lie_on_rings(seed: int, length: float) -> None:
     corners, corridors, way = drawn_plan(np.random.default_rng(seed), length)

@@ -46,7 +46,7 @@ scales = st.sampled_from([5.0, -0.004, 1.0])
 
 
 @given(gains, scales, offsets, st.floats(50, 5000), st.sampled_from([stiff, bending]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_exact_data_give_gains_and_offsets(gain, scale, offset, weight, shares):
     gain = gain * scale
     found = solve(offset, QUIET, measure(gain, offset, shares, weight), CELLS)
@@ -56,7 +56,7 @@ def test_exact_data_give_gains_and_offsets(gain, scale, offset, weight, shares):
 
 
 @given(gains, offsets, st.floats(50, 5000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_exact_data_of_a_bending_board_give_positions_too(gain, offset, weight):
     found = solve(offset, QUIET, measure(gain, offset, bending, weight), None)
     np.testing.assert_allclose(found.gain, gain, rtol=1e-4)
@@ -82,7 +82,7 @@ def test_errors_are_as_predicted():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_heavier_weight_is_never_worse(seed):
     random = np.random.default_rng(seed)
     gain = random.uniform(3, 7, 4)

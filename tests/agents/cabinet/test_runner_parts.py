@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.cabinet import Appeared, Identified, LoadChanged, Moved, Stay, Vanished, Weighed, ZoneRead
@@ -26,7 +26,6 @@ variances = st.floats(1e-6, 1.0)
 
 
 @given(lengths, lengths, angles, lengths, lengths)
-@settings(deadline=None)
 def test_a_pose_keeps_distances_and_turns(x, y, theta, a, b):
     pose = BoardPose(x, y, theta)
     assert math.dist(pose.point((0, 0)), pose.point((a, b))) == pytest.approx(math.hypot(a, b), abs=1e-9)
@@ -34,7 +33,6 @@ def test_a_pose_keeps_distances_and_turns(x, y, theta, a, b):
 
 
 @given(angles, variances, variances, st.floats(-0.99, 0.99))
-@settings(deadline=None)
 def test_a_covariance_turns_with_the_board(theta, xx, yy, correlation):
     xy = correlation * math.sqrt(xx * yy)
     turned = BoardPose(3.0, -1.0, theta).covariance((xx, xy, yy))
@@ -44,7 +42,6 @@ def test_a_covariance_turns_with_the_board(theta, xx, yy, correlation):
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(-1e5, 1e5)), min_size=1, max_size=30))
-@settings(deadline=None)
 def test_times_never_go_back_whatever_the_clock_does(steps):
     even, unix = 100.0, 1.7e9
     clocks = Clocks(lambda: unix, lambda: even)

@@ -225,7 +225,7 @@ def test_a_robot_that_restarts_is_opened_again_and_odometry_goes_on() -> None:
     assert converse(session, device, clock, 2.0)[-1].pose[0] > after[-1].pose[0] + 0.9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(

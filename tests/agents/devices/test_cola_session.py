@@ -257,7 +257,7 @@ HARM = st.tuples(st.integers(0, 25), st.integers(0, 3400), KINDS, st.integers(1,
 damage = st.lists(HARM, max_size=4, unique_by=lambda harm: harm[0])
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(damage)
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm):
     """One error in a telegram of CoLa B: two like ones cancel out in its sum. CoLa A has none and relies on TCP."""

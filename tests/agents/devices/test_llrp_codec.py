@@ -7,7 +7,7 @@ import itertools
 from datetime import UTC, datetime
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.devices.llrp import messages
@@ -63,7 +63,6 @@ def chunked(data: bytes, cuts: list[int]) -> list[bytes]:
 
 
 # not timed: the first example builds the strategies of all parameters, which a busy machine may take long for
-@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(MESSAGE)
 def test_encode_then_decode_is_the_same(message):
     assert decode(encode(message)) == message

@@ -255,7 +255,7 @@ HARM = st.tuples(st.integers(0, 25), st.integers(0, 800), KINDS, st.integers(1, 
 damage = st.lists(HARM, max_size=4, unique_by=lambda harm: harm[0])
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 @given(damage, st.sampled_from(["stream", "request"]))
 def test_a_disturbed_line_tells_nothing_wrong_and_recovers(harm, output):
     room = Room(181)

@@ -6,13 +6,12 @@ import contextlib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.devices.scip.encoding import checksum, cut_blocks, decode, encode, join_blocks
 
 #: Laws hold on a busy computer, too.
-law = settings(deadline=None)
 DIGITS = st.integers(0x30, 0x6F)
 
 
@@ -31,7 +30,6 @@ def test_sums_of_the_specification(line):
     assert checksum(line[:-1]) == line[-1]
 
 
-@law
 @given(st.sampled_from([2, 3, 4]), st.data())
 def test_what_is_encoded_is_decoded(width, data):
     values = data.draw(st.lists(st.integers(0, (1 << 6 * width) - 1), max_size=50))
@@ -43,7 +41,6 @@ def test_what_is_too_large_is_the_largest():
     assert encode(np.array([5000, -3]), 2) == b"oo00"
 
 
-@law
 @given(st.lists(DIGITS, max_size=300).map(bytes))
 def test_lines_of_data_are_joined_again(chars):
     lines = cut_blocks(chars)
@@ -51,7 +48,6 @@ def test_lines_of_data_are_joined_again(chars):
     assert join_blocks(lines).tobytes() == chars
 
 
-@law
 @given(st.lists(DIGITS, min_size=1, max_size=200).map(bytes), st.data())
 def test_one_wrong_character_is_always_noticed(chars, data):
     lines = bytearray(cut_blocks(chars))
@@ -61,7 +57,6 @@ def test_one_wrong_character_is_always_noticed(chars, data):
         join_blocks(bytes(lines))
 
 
-@law
 @given(st.lists(DIGITS, min_size=1, max_size=200).map(bytes), st.data())
 def test_a_lost_character_is_noticed_or_a_line_of_another_length(chars, data):
     lines = cut_blocks(chars)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.devices.scip import MODELS, Measure, Parameters, Reply, ReplyParser, measurement, ranges, read_capture
@@ -22,7 +22,6 @@ from tms_agents.devices.scip.status import meaning
 from tms_agents.devices.scip.wording import data, fields, nearest, reply, stamp
 
 #: Laws hold on a busy computer, too.
-law = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 TEXT = st.text(st.characters(min_codepoint=32, max_codepoint=126, exclude_characters=";"), max_size=16)
 REQUEST = st.builds(
     lambda code, start, steps, cluster, skip, count, text: Measure(
@@ -59,7 +58,6 @@ FRAME = st.one_of(measured().map(lambda found: found[0]), TEXT_REPLY)
 NOISE = st.binary(max_size=60).map(lambda raw: raw.replace(b"\n", b"\r"))
 
 
-@law
 @given(measured())
 def test_what_is_measured_comes_out(found):
     raw, request, when, distances, light = found
@@ -68,7 +66,6 @@ def test_what_is_measured_comes_out(found):
     assert (None if out.intensities is None else out.intensities.tolist()) == light
 
 
-@law
 @given(REQUEST)
 def test_requests_are_understood(request_):
     assert Measure.parse(request_.encode()) == request_
@@ -80,7 +77,6 @@ def test_a_cluster_of_none_is_one_step_and_other_commands_are_no_requests():
     assert OldMeasure.parse("G04472501") == OldMeasure(44, 725) and OldMeasure(44, 725).encode() == "G04472501"
 
 
-@law
 @given(st.lists(FRAME, max_size=5), st.lists(st.integers(0, 5000), max_size=8))
 def test_any_chunking_gives_the_same_replies(frames, cuts):
     raw = b"".join(frames)
@@ -90,7 +86,6 @@ def test_any_chunking_gives_the_same_replies(frames, cuts):
     assert len(whole.feed(b"")) == 0 and whole.skipped == 0 and parser.pending == 0
 
 
-@law
 @given(st.lists(st.tuples(NOISE, FRAME), min_size=1, max_size=4))
 def test_noise_that_ends_is_skipped(parts):
     """Noise on a line of its own, as after a burst: the replies behind it are all there."""
@@ -100,7 +95,6 @@ def test_noise_that_ends_is_skipped(parts):
     ]
 
 
-@law
 @given(measured(), measured(), st.data())
 def test_a_scan_that_lost_its_end_does_not_take_the_next_with_it(first, second, data_):
     cut = data_.draw(st.integers(0, len(first[0]) - 3))
@@ -109,7 +103,6 @@ def test_a_scan_that_lost_its_end_does_not_take_the_next_with_it(first, second, 
     assert got.distances.tolist() == second[3]
 
 
-@law
 @given(measured(), st.data())
 def test_damage_in_a_scan_is_never_delivered(found, data_):
     """One wrong or one lost byte: nothing comes out, or (noise in the command alone) the same distances."""
@@ -120,7 +113,6 @@ def test_damage_in_a_scan_is_never_delivered(found, data_):
         assert all(one.distances.tolist() == distances for one in read_capture(damaged))
 
 
-@law
 @given(st.lists(st.one_of(st.binary(max_size=300), FRAME), max_size=8))
 def test_any_bytes_are_survived_in_bounded_memory(pieces):
     parser = ReplyParser()
@@ -238,7 +230,6 @@ def test_the_largest_short_range_is_no_range():
     np.testing.assert_allclose(ranges(found, MODELS["URG-04LX"].parameters), [4.094, math.inf])
 
 
-@law
 @given(st.sampled_from(sorted(MODELS)), st.lists(st.integers(25, 5600), min_size=1, max_size=50))
 def test_ranges_survive_the_sensor(model, millimetres):
     p = MODELS[model].parameters
@@ -254,7 +245,6 @@ def test_only_models_that_have_it_are_asked_for_intensity():
     assert not coding_of("a sensor of next year").intensity
 
 
-@law
 @given(st.integers(1, 30), st.lists(st.integers(0, 100), min_size=1, max_size=60))
 def test_the_nearest_of_a_cluster(cluster, values):
     raw = np.array(values, np.int32)
@@ -263,7 +253,6 @@ def test_the_nearest_of_a_cluster(cluster, values):
     assert picked.tolist() == [min([v for v in group if v >= 20], default=group[0]) for group in groups]
 
 
-@law
 @given(
     st.integers(0, STAMP_TURN_MS - 1),
     st.lists(st.integers(0, 3 * STAMP_TURN_MS), min_size=1, max_size=20),

@@ -271,7 +271,7 @@ def test_damaged_scans_are_left_out_and_nothing_else(fault):
     assert sensor.device.heard.count("ME0000108001000") == 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.sampled_from(sorted(MODELS)),
     st.lists(
@@ -297,7 +297,7 @@ def test_the_emulator_hears_anything(model, said):
     assert len(sensor.scans(4.0, step_s=0.05)) > 5
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(
         st.tuples(

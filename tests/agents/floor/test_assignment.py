@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from tms_agents.floor.assignment import assign
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(rows=st.integers(1, 9), extra=st.integers(0, 9), seed=st.integers(0, 10**6), coarse=st.booleans())
 def test_the_sum_is_the_least(rows: int, extra: int, seed: int, coarse: bool) -> None:
     cost = np.random.default_rng(seed).uniform(0.0, 10.0, (rows, rows + extra))

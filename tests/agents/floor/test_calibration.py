@@ -25,7 +25,7 @@ def looked(room, pose, scans=20, beams=SWEEP):
     return np.array([room.ranges(beams, pose) for _ in range(scans)])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     x=st.floats(0.5, WIDTH - 0.5),
     y=st.floats(0.5, DEPTH - 0.5),

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from floor_rooms import WALLS, Room, box, sweep, thing, together, walker
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, FloorSettings, Scene, Sensor, Vanished
@@ -152,7 +152,7 @@ def test_a_static_room_with_noise_tells_nothing() -> None:
     assert events == []
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6)
 @given(
     x=st.floats(1.0, 3.5),
     y=st.floats(1.0, 3.0),

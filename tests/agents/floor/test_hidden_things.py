@@ -33,13 +33,13 @@ def removals(verdicts: list[int]) -> int:
     return gone
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(15, 40), st.integers(0, 14))
 def test_glimpses_past_the_edge_of_what_hides_a_thing_do_not_add_up(every: int, first: int) -> None:
     assert removals([FREE if k % every == first else HIDDEN for k in range(2000)]) == 0
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 100))
 def test_a_thing_whose_place_is_seen_to_be_empty_after_all_has_gone(hidden: int) -> None:
     assert removals([HIDDEN] * hidden + [FREE] * 8) == 1

@@ -88,7 +88,7 @@ def test_it_is_readable_while_it_is_written(tmp_path):
     assert_holds(read_recording(path)[0], scans)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(cut=st.integers(0, 4000), tail=st.binary(max_size=40))
 def test_a_power_cut_costs_the_last_second_and_never_the_file(tmp_path_factory, cut, tail):
     path, one = tmp_path_factory.mktemp("cut") / "x.scans", sweep()

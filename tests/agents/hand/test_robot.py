@@ -239,7 +239,7 @@ STEP = st.tuples(
 )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.lists(STEP, max_size=25))
 def test_every_label_appears_once_and_goes_once_whatever_happens(steps):
     butler = Butler()
@@ -283,7 +283,6 @@ MESSAGE = st.fixed_dictionaries(
 )
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(MESSAGE, st.floats(-10, 10), st.sampled_from([TEA, CUP, ""])), max_size=30))
 def test_any_valid_message_is_taken(messages):
     butler = Butler()

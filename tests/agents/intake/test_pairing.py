@@ -182,7 +182,7 @@ class Watch:
             self.known.add(outcome.tag)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(st.lists(st.tuples(PAUSE, ACTION), max_size=60))
 def test_laws(steps):
     one, watch, t = pairing(), Watch(), 0.0

@@ -36,7 +36,7 @@ def drawn(places: Floats, free: float = 0.05) -> tuple[Floats, tuple[float, floa
     return cells, origin
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.08, 0.08), st.integers(0, 99))
 def test_a_robot_that_was_nudged_finds_its_place(x: float, y: float, turn: float, seed: int) -> None:
     truth = np.array([2.0, 1.5, 0.7])

@@ -110,7 +110,7 @@ def test_what_is_no_log_is_said_so(tmp_path, name, text, why):
 _words = st.sampled_from([*FLASER.split(), *NEWER.split(), "-3", "1e999", "nan", "99999999999", "ODOM", "é", "{"])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.lists(_words, max_size=30).map(" ".join), max_size=5))
 def test_any_carmen_lines(lines):
     try:
@@ -136,7 +136,7 @@ _records = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.one_of(_records.map(json.dumps), st.text(max_size=20)), max_size=6))
 def test_any_lines_of_a_recording(lines):
     try:

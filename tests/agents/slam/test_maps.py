@@ -28,7 +28,7 @@ def random_scans(seed: int, count: int, maps: int) -> list[tuple[np.ndarray, np.
     return found
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 12), resolution=st.sampled_from([0.05, 0.1, 0.03]))
 def test_the_field_is_the_distance_to_the_nearest_occupied_cell(seed, count, resolution):
     maps = Maps(3, resolution, 0.5)

@@ -89,7 +89,7 @@ def test_lasers_that_count_the_other_way_round():
     np.testing.assert_array_equal(found_in(other, 4)[::-1], found_in(log, 4))
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(seed=st.integers(100, 10_000))
 def test_in_a_building_without_people_hardly_a_beam_is_one(seed):
     driven = drive("block", Drive(seed=seed, step_m=0.6))

@@ -25,7 +25,7 @@ def add_up(costs, done, sums):
 
 
 @pytest.mark.parametrize("threads", [1, numba.config.NUMBA_NUM_THREADS])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(costs=st.lists(st.sampled_from([0, 1, 100, 20_000]), max_size=70))
 def test_each_piece_is_done_once(threads, costs):
     numba.set_num_threads(threads)

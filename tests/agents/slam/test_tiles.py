@@ -29,7 +29,7 @@ def write(maps: TiledMaps, n: int, y: int, x: int, value: int) -> None:
     maps.cells[maps.directory[n, y // SIDE, x // SIDE], (y % SIDE) * SIDE + x % SIDE] = value
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.one_of(writes, writes, resamplings), max_size=40))
 def test_copy_on_write_is_as_good_as_a_copy(operations):
     maps = TiledMaps(MAPS, BLANK, HEIGHT, WIDTH)

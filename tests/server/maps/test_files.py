@@ -9,7 +9,7 @@ import httpx
 import map_server
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from map_robot import MAP, Robot, measured, tile
 from PIL import Image
@@ -48,7 +48,6 @@ def rasters(draw: st.DrawFn) -> tuple[Raster, np.ndarray]:
     return Raster(bounds, tiles), cells[bottom:top, left:right]
 
 
-@settings(deadline=None)
 @given(rasters(), st.sampled_from([0.02, 0.05, 1 / 3, 1.0]), st.tuples(*[st.floats(-1e4, 1e4)] * 2))
 def test_ros_reads_what_was_written(
     drawn: tuple[Raster, np.ndarray], resolution: float, origin: tuple[float, float]

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import httpx
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 Registry = Callable[[str], Awaitable[list[dict[str, Any]]]]
@@ -146,7 +146,7 @@ async def test_patch_keeps_the_absent_and_clears_null(town: httpx.AsyncClient) -
     fields = st.lists(st.sampled_from(sorted(changes)), unique=True)
     clearable = st.lists(st.sampled_from(sorted(whole.keys() - {"name"})), unique=True)
 
-    @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @settings(max_examples=25)
     @given(fields, clearable)
     def law(change: list[str], clear: list[str]) -> None:
         asyncio.run_coroutine_threadsafe(check([n for n in change if n not in clear], clear), loop).result(60)
@@ -178,7 +178,7 @@ async def test_pages_concatenated_are_the_whole_in_order(town: httpx.AsyncClient
         (("q", "odd"), ("room", "lab")): [t for i, t in enumerate(tags) if i % 2 and i % 3],
     }
 
-    @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @settings(max_examples=20)
     @given(st.integers(1, 50), st.sampled_from(sorted(expected)))
     def law(limit: int, query: tuple[tuple[str, str], ...]) -> None:
         found = asyncio.run_coroutine_threadsafe(listed(limit, **dict(query)), loop).result(60)

@@ -64,7 +64,7 @@ def small(budget: int | None = None, **params: Any) -> Engine:
 
 
 @given(seeds, st.sampled_from([None, 1, 3, 10]))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_restored_engine_goes_on_bit_for_bit(seed: int, budget: int | None) -> None:
     scenario = world(seed)
     engine = engine_of(scenario, budget)
@@ -80,7 +80,7 @@ def test_a_restored_engine_goes_on_bit_for_bit(seed: int, budget: int | None) ->
 
 
 @given(seeds, st.sampled_from([1, 4, 20]))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_budget_is_kept_and_the_belief_stays_a_distribution(seed: int, budget: int) -> None:
     scenario = world(seed, events=20)
     engine = engine_of(scenario, budget)
@@ -98,7 +98,7 @@ def test_a_budget_is_kept_and_the_belief_stays_a_distribution(seed: int, budget:
 
 
 @given(seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_idle_events_change_no_bit(seed: int) -> None:
     scenario = world(seed)
     engine = engine_of(scenario, 5)
@@ -114,7 +114,7 @@ def test_idle_events_change_no_bit(seed: int) -> None:
 
 
 @given(st.sampled_from("abc"), st.floats(50.0, 400.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_weight_tells_the_same_with_the_label_and_after_it(left: str, grams: float) -> None:
     at_once, later = (small(p_phantom={"cabinet": 0.1}, p_jump=0.01) for _ in range(2))
     put = {"label": "B1", "kind": "cabinet", "xy": (0.5, 0.3)}
@@ -214,7 +214,7 @@ def test_transfer_of_several_things_to_one_place_is_invalid() -> None:
 
 
 @given(seeds, st.sampled_from([1e-2, 1e-4, 1e-9]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_certificate_bounds_what_pruning_lost(seed: int, eps: float) -> None:
     maker = WorldMaker(Random(seed), events=10)
     full = Oracle(maker.scenario)
@@ -294,7 +294,7 @@ def test_what_was_outside_is_found_by_a_jump_of_its_own() -> None:
 
 
 @given(seeds, st.floats(0.01, 0.33))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_an_object_may_join_at_several_places(seed: int, p: float) -> None:
     """The prior is respected, occupied labels are refused, the others' marginals stay, and all still sums to 1."""
     scenario = world(seed)

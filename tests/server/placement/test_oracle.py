@@ -45,7 +45,7 @@ def same(engine: Engine, oracle: Oracle, where: object) -> None:
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_random_scenarios_equal_the_oracle(seed: int) -> None:
     compare(WorldMaker(Random(seed)).scenario)
 

@@ -23,7 +23,7 @@ def paper(seed: int, individuals: int = 50) -> tuple[PaperFilter, list]:  # type
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_it_survives_every_event_and_a_restart(seed: int) -> None:
     one, events = paper(seed)
     two, _ = paper(seed)

@@ -14,7 +14,6 @@ TAGS = ["E1", "E2", "E3"]
 # No shrinking: an example is a second of real appends, and its seed says all.
 FEW = settings(
     max_examples=12,
-    deadline=None,
     suppress_health_check=list(HealthCheck),
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
 )

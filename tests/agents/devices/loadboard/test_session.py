@@ -184,7 +184,7 @@ def test_a_board_has_at_least_one_cell_and_an_index_for_each():
         RosTmsBoardSession(cells=0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.lists(
         st.tuples(st.sampled_from(["data", "wait"]), st.binary(max_size=80), st.floats(0, 0.2)),
@@ -223,7 +223,7 @@ def test_asked_all_at_once_a_round_is_told_late_unless_somebody_waits_for_it():
     assert min(delays(False)) > 0.03 and max(delays(True)) < 0.035
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32))
 def test_asked_all_at_once_no_answer_is_given_to_another_cell(seed):
     """Late answers, garbage, cut frames and power cycles; every complete round that comes out is right."""

@@ -29,7 +29,7 @@ def test_any_chunking_gives_the_same_samples(dialect, cuts, end):
     assert repr(pieces) == repr(whole) and len(whole) >= 2  # NaN differs from itself, not in print
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.sampled_from(sorted(DIALECTS)),
     st.sampled_from(["poll", "stream"]),

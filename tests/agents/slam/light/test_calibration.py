@@ -17,7 +17,7 @@ ORIGIN = np.zeros(2)
 @given(
     st.floats(-np.pi, np.pi), st.floats(0.5, 3.0), st.floats(-0.9, 0.9), st.integers(0, 2**16)
 )  # fmt: skip
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_wall_is_met_at_its_angle(heading, distance, turn, seed):
     """A beam along ``heading`` meets a wall whose normal is turned by ``turn``."""
     random = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def test_what_is_left_is_the_surface():
 
 
 @given(st.floats(1e-3, 1e3))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_the_unit_of_intensity_does_not_matter(gain):
     ranges, incidence, intensities, _ = beams(1, 2000)
     light, deviation = learn(ranges, incidence, intensities).normalised(ranges, incidence, intensities)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.slam import LogError
@@ -50,7 +50,6 @@ def test_lines_that_are_no_rounds_are_left_out(lines: list[str]) -> None:
     assert bad == 1
 
 
-@settings(deadline=None)  # the first one compiles
 @given(st.floats(0.1, 5), st.floats(-3.1, 3.1), st.floats(-3.1, 3.1))
 def test_reading_is_less_probable_farther_away(distance: float, bearing: float, facing: float) -> None:
     antenna = Antenna(np.zeros(3), 2.0, 1.0)

@@ -96,7 +96,7 @@ def test_weights_sum_to_one(logarithms: Floats) -> None:
     assert (weights >= 0).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(np.float64, st.integers(1, 12), elements=st.floats(0.0, 1.0)), st.integers(0, 99))
 def test_residual_resampling_keeps_the_expected_counts(raw: Floats, seed: int) -> None:
     weights = (raw + 1e-6) / (raw + 1e-6).sum()
