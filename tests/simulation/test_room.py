@@ -16,7 +16,7 @@ from tms_agents.simulation.catalogue import ITEMS, with_check_digit
 from tms_agents.simulation.floor import FloorAgent
 from tms_agents.simulation.player import LATE_S, Player
 from tms_agents.simulation.room import CABINETS, PERSON, ROBOT, SPOTS, WAYS, description, new_world
-from tms_agents.simulation.script import Firm, Script, Told, reach
+from tms_agents.simulation.script import Firm, Script, Told, reach, walk
 from tms_agents.simulation.story import STEPS, furnish
 from tms_agents.simulation.world import HAND_SPEED, Impossible, Outside, Place, World, Xy
 from tms_client.cli import CommandError
@@ -189,6 +189,25 @@ def test_while_a_script_waits_the_room_stands_still_and_clocks_go_on() -> None:
     assert playing.now - START > timedelta(seconds=LATE_S)
     assert [one.type for one in senses.said][:3] == ["inventory", "agent_state", "agent_state"], "signs of life"
     playing.play(iter([Told(or_go_on=True)]))
+
+
+def test_after_a_stall_nobody_leaps() -> None:
+    time, world, way = Time(), new_world(), list[tuple[float, Xy]]()
+
+    class Watch(Hearsay):
+        def follow(self, world: World) -> None:
+            way.append((time.seconds, world.movers[PERSON].xy))
+
+    def sleep(seconds: float) -> None:
+        time.sleep(seconds + (3.0 if len(way) == 10 else 0.0))
+
+    floor = FloorAgent("floor", np.random.default_rng(0), lambda: "floor/1")
+    playing = Player(world, floor, Watch(), speed=1.0, clock=time.now, sleep=sleep, monotonic=time.monotonic)
+    playing.play(walk(world, PERSON, "bed", "front of A"))
+    assert way[-1][0] > 3.0
+    assert playing.now == time.now()
+    for (before, here), (after, there) in itertools.pairwise(way):
+        assert math.dist(here, there) <= world.movers[PERSON].speed * (after - before) + 1e-9
 
 
 def test_walking_takes_time_and_arrives() -> None:

@@ -77,7 +77,7 @@ class Bookkeeper:
         if explanation.kind in ("put", "swap"):
             assert explanation.load is not None
             variance = step.variance + gone_variance
-            thing = self._shelf.put(explanation.load, variance, since=step.settled, onset=step.onset)
+            thing = self._shelf.put(explanation.load, variance, since=step.settled, onset=step.earliest)
             before_variance = step.before_variance + gone_variance
             self.settling = Settling(thing, step.before - gone, before_variance, step.now)
             if explanation.kind == "put":
@@ -150,7 +150,7 @@ class Bookkeeper:
         for load in (explanation.load, explanation.second):
             # Not told apart: each may stand anywhere.
             variance = explanation.variance if explanation.variance is not None else (0.35 * load.sum()) ** 2 + load * 0
-            thing = self._shelf.put(load, variance, since=step.settled, onset=step.onset)
+            thing = self._shelf.put(load, variance, since=step.settled, onset=step.earliest)
             at = thing.centre(self._shelf.geometry)
             thing.told = at.xy
             events.append(Appeared(step.now, thing.id, at.xy, at.cov, at.weight_g, at.weight_sd_g))

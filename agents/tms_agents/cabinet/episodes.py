@@ -61,6 +61,8 @@ class Episode:
     variance: Array
     things: list[Thing]
     onset: float
+    #: When it may have begun: before ``onset`` where nobody looked then.
+    earliest: float
     way: list[tuple[Array, Array]] = field(default_factory=list)
 
     def add(self, block: Block) -> None:

@@ -159,7 +159,7 @@ class CabinetEstimator:
         self._balance.shaking = self._wobble.shaking
         step = self._detector.push(block)
         if not self._detector.resting:
-            self._hindsight.changing(block, self._detector.level)
+            self._hindsight.changing(block, self._detector.level, self._detector.unwatched_since)
         if step is not None:
             return self._explain(step)
         if self._detector.resting and block.end - self._looked > 0.5:
@@ -282,7 +282,8 @@ class CabinetEstimator:
             return []
         if best.kind == "slide":
             self._book.doubt(step, best, others)
-        return self._take(step, best)
+        self._detector.accept(step)
+        return self._apply(step, best)
 
     def _decided(self, step: Step, outcome: Outcome) -> list[CabinetEvent]:
         """What is not simple is decided by all that happened since the last rest, as soon as that is sure."""
@@ -304,11 +305,8 @@ class CabinetEstimator:
         if not self._balance.known:
             return None
         level, variance = step.before + step.change, step.variance - step.before_variance
-        return self._balance.compare(step.onset, step.settled, step.now, level, variance)
-
-    def _take(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
-        self._detector.accept(step)
-        return self._apply(step, explanation)
+        whole = self._balance.compare(step.onset, step.settled, step.now, level, variance)
+        return replace(whole, unwatched_since=step.unwatched_since)
 
     def _apply(self, step: Step, explanation: Explanation) -> list[CabinetEvent]:
         for thing in explanation.removed:

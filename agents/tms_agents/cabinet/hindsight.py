@@ -69,10 +69,11 @@ class Hindsight:
         self._heard: frozenset[str] = frozenset()
         self._revisions = 0
 
-    def changing(self, block: Block, level: Level) -> None:
-        """The load is not at rest; ``level`` is where it last rested."""
+    def changing(self, block: Block, level: Level, unwatched_since: float | None = None) -> None:
+        """The load is not at rest; ``level`` is where it rested last. It may have left it while no samples came."""
         if self._before is not None:
-            self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start)
+            earliest = block.start if unwatched_since is None else unwatched_since
+            self._episode = Episode(level.mean.copy(), level.variance.copy(), self._before, block.start, earliest)
             self._before, self._uncertain, self._revisions, self._likely = None, False, 0, 1.0
         self._sure = False
         if self._episode is not None:
@@ -113,7 +114,7 @@ class Hindsight:
         level, variance = step.before + step.change, step.variance - step.before_variance
         best = self._outcomes(self._episode, step.now, level, variance, step.settled, shaking or self._uncertain)[0]
         # What has been brought and is not there yet is on its way.
-        coming = self._namer.fresh(self._episode.onset - _BROUGHT_S).difference(best.new)
+        coming = self._namer.fresh(self._episode.earliest - _BROUGHT_S).difference(best.new)
         return best if best.known and best.score >= _SURE_AT_ONCE and not coming else None
 
     def tell(self, outcome: Outcome, t: float) -> list[CabinetEvent]:
@@ -169,7 +170,7 @@ class Hindsight:
                 lambda tag: self._odds(tag, rested + IN_HAND_S),
                 self._namer.weight,
                 shaking,
-                self._namer.fresh(episode.onset - _BROUGHT_S),
+                self._namer.fresh(episode.earliest - _BROUGHT_S),
                 max(_IN_HAND - max(t - rested - IN_HAND_S, 0.0) / _HELD_S, _KEPT),
             ),
             self._shelf.geometry,

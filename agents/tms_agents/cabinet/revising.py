@@ -97,7 +97,7 @@ class Revision:
                 fresh.remove(thing)
         events += [self._remove(thing) for thing in fresh]
         for old in back:
-            events += self._put(old.load, old.variance, old.tag, old.since)
+            events += self._put(old.load, old.variance, old.tag, back=old)
             # A stay is never used again: from now on this is the one that stood there before.
             old.id = self._shelf.next_id - 1
         known = set(self._shelf.things)
@@ -130,7 +130,7 @@ class Revision:
         load, variance = self._outcome.load, self._outcome.variance
         if len(stays) + len(wanted) == 1:
             if wanted:
-                return self._put(load, variance, wanted[0], self._episode.onset)
+                return self._put(load, variance, wanted[0])
             stays[0].load, stays[0].variance, stays[0].joint = load.copy(), variance.copy(), frozenset()
             stays[0].forget_place()
             return self._tell(stays)
@@ -139,7 +139,7 @@ class Revision:
             least = min(5.0, 0.2 * float(load.sum()))
             if float(rest.sum()) > least:
                 errors = variance + sum((thing.variance for thing in stays), np.zeros_like(load))
-                return self._put(rest, errors, wanted[0], self._episode.onset)
+                return self._put(rest, errors, wanted[0])
         if not wanted:
             total = sum((thing.variance for thing in stays), np.zeros_like(load))
             for thing in stays:
@@ -158,12 +158,13 @@ class Revision:
             thing.load, thing.variance = share, guess
             thing.forget_place()
         for tag, (share, guess) in zip(wanted, guesses[len(stays) :], strict=True):
-            events += self._put(share, guess, tag, self._episode.onset)
+            events += self._put(share, guess, tag)
             together.append(self._shelf.things[self._shelf.next_id - 1])
         return [*events, self._shelf.join(self._now, together)]
 
-    def _put(self, load: Array, variance: Array, tag: str | None, since: float) -> list[CabinetEvent]:
-        thing = self._shelf.put(load.copy(), variance.copy(), since=since, onset=since)
+    def _put(self, load: Array, variance: Array, tag: str | None, back: Thing | None = None) -> list[CabinetEvent]:
+        since, earliest = (self._episode.onset, self._episode.earliest) if back is None else (back.since, back.since)
+        thing = self._shelf.put(load.copy(), variance.copy(), since=since, onset=earliest)
         events: list[CabinetEvent] = []
         at = thing.centre(self._shelf.geometry)
         thing.told = at.xy

@@ -25,6 +25,8 @@ from tms_agents.cabinet.steady import average, chi_square_limit, restlessness, s
 _CHANGING_BLOCKS = 1000
 #: Blocks remembered before a change.
 _HISTORY_BLOCKS = 75
+#: Longer without a sample, and something may have happened meanwhile; it is noticed within as much.
+_GAP_S = 0.4
 #: Loudness is judged for so many blocks at a time, knowing so many before and after them.
 _JUDGED, _CONTEXT = 6, 3
 
@@ -51,10 +53,17 @@ class Step:
     restless: float
     #: All of it, block by block; None for what is no step of the load.
     way: Way | None = None
+    #: Nothing was measured from then to ``onset``: it may have come at any time between.
+    unwatched_since: float | None = None
 
     @property
     def weight_g(self) -> float:
         return float(self.change.sum())
+
+    @property
+    def earliest(self) -> float:
+        """When it may have begun."""
+        return self.onset if self.unwatched_since is None else self.unwatched_since
 
 
 class StepDetector:
@@ -67,6 +76,8 @@ class StepDetector:
         self._history: deque[Block] = deque(maxlen=_HISTORY_BLOCKS)
         self._loudness = Loudness()
         self._resting_blocks = 0
+        #: The end of the newest block, and the newest gap between two; what was before the first nobody knows.
+        self._until, self._gap = 0.0, (0.0, 0.0)
         #: Since when the load rests at its level, or rested there last.
         self.since = 0.0
         self._changed: list[Block] | None = None
@@ -77,8 +88,17 @@ class StepDetector:
     def resting(self) -> bool:
         return self._changed is None
 
+    @property
+    def unwatched_since(self) -> float | None:
+        """Where samples were missing when the load left its level: since when."""
+        start, end = self._gap
+        return start if self._changed and 0.0 <= self._changed[0].start - end < _GAP_S else None
+
     def push(self, block: Block) -> Step | None:
         """Take one block; a step if the load is steady at another level."""
+        if block.start - self._until > _GAP_S:
+            self._gap = (self._until, block.start)
+        self._until = block.end
         self._history.append(block)
         if self._changed is None:
             self._rest(block)
@@ -216,6 +236,7 @@ class StepDetector:
             path_variance=np.array([block.variance for block in way]).reshape(-1, self._cells),
             restless=restlessness(steady, change),
             way=self._way([*way, *steady], len(way)),
+            unwatched_since=self.unwatched_since,
         )
         total = step.weight_g**2 / float(variance.sum())
         score = max(total, float((change**2 / variance).sum()) / self._whole_limit)

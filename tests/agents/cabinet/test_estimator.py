@@ -191,6 +191,22 @@ def test_a_tag_that_was_read_once_is_waited_for(first: float) -> None:
     assert tag.stay == put.stay and tag.t == pytest.approx(put.t, abs=1e-9)
 
 
+@pytest.mark.parametrize("seconds", [1.6, 6.0, 40.0])
+@pytest.mark.parametrize("told", [True, False])
+def test_a_tag_is_that_of_what_was_put_while_the_board_delivered_nothing(seconds: float, told: bool) -> None:
+    bench = Bench()
+    bench.load, bench.tags = 400 * share(0.2, 0.1), frozenset({"A"})
+    if told:  # the line says that the board is gone
+        bench.estimator.load(bench.t, np.full(4, np.nan))
+    begin = bench.t
+    while bench.t < begin + seconds:
+        bench.t += 0.2
+        bench.events += bench.estimator.inventory(bench.t, "shelf", bench.tags)
+    appeared = of(Appeared, bench.run(6.0))
+    assert [one.stay for one in appeared] == [one.stay for one in of(Identified, bench.events)]
+    assert [one.tag for one in bench.estimator.stays()] == ["A"]
+
+
 def test_a_weight_that_is_owed_is_told_after_a_restart() -> None:
     bench = Bench(seed=4)
     bench.load = 300 * share(0.3, 0.1)

@@ -34,7 +34,7 @@ def before() -> tuple[Episode, dict[str, Thing]]:
         for i, (tag, at) in enumerate(places.items(), 1)
     ]
     level = sum((thing.load for thing in things), np.zeros(4))
-    return Episode(level, NOISE, things, 10.0), {str(thing.tag): thing for thing in things}
+    return Episode(level, NOISE, things, 10.0, 10.0), {str(thing.tag): thing for thing in things}
 
 
 def known(*there: str, shaking: bool = False) -> Known:
@@ -77,7 +77,7 @@ def test_a_little_more_where_something_was_just_put_is_the_rest_of_it(
     since: float, at: tuple[float, float], new: tuple[str | None, ...]
 ) -> None:
     first = Thing(1, 26 * share(0.3, 0.1), NOISE.copy(), since, since - 1.0)
-    episode = Episode(first.load.copy(), NOISE, [first], 10.0)
+    episode = Episode(first.load.copy(), NOISE, [first], 10.0, 10.0)
     assert best(episode, episode.level + 18 * share(*at), known()).new == new
 
 
@@ -104,7 +104,7 @@ def test_the_order_of_things_and_tags_does_not_matter(things: list[str], tags: l
     episode, by_tag = before()
     level = episode.level - by_tag["A"].load + 220 * share(0.3, 0.1)
     usual = outcomes(episode, 20.0, level, NOISE, known("B", "C", "N", "X"), GEOMETRY, 0.01)
-    mixed = Episode(episode.level, NOISE, [by_tag[tag] for tag in things], 10.0)
+    mixed = Episode(episode.level, NOISE, [by_tag[tag] for tag in things], 10.0, 10.0)
     other = outcomes(mixed, 20.0, level, NOISE, known("C", *tags, "B"), GEOMETRY, 0.01)
     assert (usual[0].gone, order(usual[0].new)) == (other[0].gone, order(other[0].new))
     assert usual[0].score == pytest.approx(other[0].score, abs=1e-6)
@@ -122,7 +122,7 @@ def test_every_plan_is_there_once_and_possible(count: int, tags: list[str], shak
         assert not own & {tag for tag in new if tag is not None}, "what stands there has not come"
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_a_revised_shelf_is_what_the_outcome_says(data: st.DataObject) -> None:
     episode, things = before()
