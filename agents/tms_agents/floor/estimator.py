@@ -36,6 +36,8 @@ _DARK = np.zeros(0)
 _WAITS_S = 25.0
 #: So long (s) after the room was learned, slivers of it are no things.
 _UNSETTLED_S = 30.0
+#: So wide (m) is no edge of anybody.
+_EDGE_M = 0.12
 #: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
 _FORMAT = 5
 
@@ -177,7 +179,8 @@ class FloorEstimator:
             q["revealed"] = LOOKS
             return []
         # Who has stood there all the time was learned with the room, and shows an edge of himself when he shifts.
-        sliver = q["attached"] > 0.02 or (q["beams"] < 2.0 and not q["given"])
+        edge = q["width"] < _EDGE_M or q["whole"] < 0.8 * q["hits"]
+        sliver = (q["attached"] > 0.02 and edge) or (q["beams"] < 2.0 and not q["given"])
         unsettled = sliver and started < self._settings.learn_s + _UNSETTLED_S
         if unsettled or (not q["given"] and self._tracks.absent.stands(q)):
             return []

@@ -38,6 +38,8 @@ _STILL_M, _STILL = 0.008, 0.001
 NEAR_M = 0.36
 #: Seen so often, a shoe is not so thin (m), a leg not so much thinner or wider than it was.
 _OFTEN, _SHOE_M, _LEG = 10, 0.07, (0.65, 1.6)
+#: What is so far (m) beside a robot that has rested for so long (s) is no part of it.
+_CLEAR_M, _PARKED_S = 0.06, 3.0
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
 
@@ -248,6 +250,8 @@ def attend(prints: Any, bodies: Any, t: float, dt: float) -> None:
             if body.stale:
                 continue
             d = np.hypot(body.x - q.x, body.y - q.y)
+            if body.machine and t - body.rest_at > _PARKED_S and d > 0.5 * (body.far + q.width) + _CLEAR_M:
+                continue
             reach = NEAR_M + (0.3 if body.robot else 0.0)
             if t - body.a_seen < 0.6 and body.a_print != j:
                 d = min(d, np.hypot(body.ax - q.x, body.ay - q.y))

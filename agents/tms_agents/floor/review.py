@@ -18,13 +18,15 @@ Array = NDArray[np.float64]
 NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
-#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer.
-_STEP_M = 0.1
+#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer, and nobody
+#: has left a foot so far (m) behind.
+_STEP_M, _STRIDE_M = 0.1, 0.9
 #: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
 #: likely a thing: time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
-#: Not even who has come step by step stands for so long (s) without shifting a foot.
-_STILL_S = 900.0
+#: Not even who has come step by step stands for so long (s) without shifting a foot, nor for so long with one shoe
+#: behind the other, if shoes are all that is seen.
+_STILL_S, _SHOD_S = 900.0, 20.0
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
@@ -59,16 +61,16 @@ def _is_lone(body: Any, t: float) -> bool:
         return False
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)
     a, b = t - body.a_seen, t - body.b_seen
+    since = body.a_since if a < b else body.b_since
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
     if _has_walked(body) and body.older < _OLDER_S and not body.odd and both:
         # One leg hides the other for as long as he likes.
-        return bool(body.still > _STILL_S)
+        return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
     if body.still > _STILL_S or sliver:
         return True
-    since = body.a_since if a < b else body.b_since
     return bool(max(a, b) > 1.0 and t - since > 1.0)
 
 
@@ -203,7 +205,11 @@ def review(
             foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
             if _is_lone(body, t):
                 x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
-                behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
+                behind = (
+                    t - at > 0.5
+                    and np.hypot(foot_x - x, foot_y - y) < _STRIDE_M
+                    and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
+                )
                 if body.lone == 0.0:
                     body.lone_x, body.lone_y = foot_x, foot_y
                 if body.older > _OLDER_S:

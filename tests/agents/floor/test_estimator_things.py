@@ -27,6 +27,15 @@ def test_a_thing_right_before_a_wall_stays_a_thing() -> None:
     assert 150.0 < taken.t < 151.0
 
 
+def test_a_box_put_at_a_wall_soon_after_the_start_is_told() -> None:
+    def segments(t: float) -> tuple[Segment, ...]:
+        return WALLS if t < 13.0 else (*WALLS, *box(2.5, 3.918, 0.15, 0.15))
+
+    _, events = Room(walker(AT_THE_WALL), segments).play(30.0)
+    (put,) = born(events, "object")
+    assert math.hypot(put.xy[0] - 2.5, put.xy[1] - 3.918) < 0.05
+
+
 def test_a_thing_is_told_while_who_put_it_still_stands_there() -> None:
     _, events = Room(together(walker(STAYS), thing(1.75, 2.0, 0.05, 14.0))).play(20.0)
     (put,) = born(events, "object")
@@ -116,6 +125,21 @@ def test_a_robot_is_one_robot_in_parts_and_beside_people() -> None:
     assert len(seen) == 1
     assert missed < 10
     assert not [one for one in born(events, "object") if one.t > 17.0]
+
+
+@pytest.mark.parametrize("gap", [0.22, 0.3])
+def test_a_thing_put_down_beside_a_robot_that_waits_is_told(gap: float) -> None:
+    """It goes on standing there, and hides what came beside it only later."""
+
+    def segments(t: float) -> tuple[Segment, ...]:
+        x = float(np.interp(t, [9.0, 17.0], [4.6, 2.4]))
+        return WALLS if t < 9.0 else (*WALLS, *box(x, 2.6, 0.55, 0.42))
+
+    giver = walker([(20.0, 4.9, 1.2), (24.0, 2.8, 1.6), (26.0, 2.8, 1.6), (30.0, 4.9, 1.2)])
+    room = Room(together(giver, thing(2.4, 2.6 - 0.21 - gap - 0.06, 0.06, 25.0)), segments)
+    _, events = room.play(36.0, scene=Scene(robots=((0.55, 0.42),)))
+    (put,) = [one for one in born(events, "object") if one.t > 17.0]
+    assert math.hypot(put.xy[0] - 2.4, put.xy[1] - (2.33 - gap)) < 0.03
 
 
 @pytest.mark.parametrize("size", [(0.55, 0.35), (0.26, 0.26)])
