@@ -26,7 +26,7 @@ _STEP_M, _STRIDE_M = 0.1, 0.9
 _OLDER_S, _FASTER = 1.0, 2.5
 #: Not even who has come step by step stands for so long (s) without shifting a foot, nor for so long with one shoe
 #: behind the other, if shoes are all that is seen.
-_STILL_S, _SHOD_S = 900.0, 20.0
+_STILL_S, _SHOD_S = 900.0, 60.0
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.

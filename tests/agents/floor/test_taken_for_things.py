@@ -118,7 +118,7 @@ def test_nobody_left_a_foot_further_behind_than_a_stride(other_x: float, lost: b
     assert (LOST in found(standing(2.0, other_x), 8.0, COVERED)) == lost
 
 
-@pytest.mark.parametrize(("shoe", "seconds", "lost"), [(1.0, 15.0, False), (1.0, 30.0, True), (0.0, 30.0, False)])
+@pytest.mark.parametrize(("shoe", "seconds", "lost"), [(1.0, 50.0, False), (1.0, 80.0, True), (0.0, 80.0, False)])
 def test_one_shoe_does_not_hide_behind_the_other_for_long(shoe: float, seconds: float, lost: bool) -> None:
     assert (LOST in found(standing(2.0, 2.2, shoe=shoe), seconds)) == lost
 
