@@ -136,7 +136,7 @@ class FloorEstimator:
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
         if recognize(bodies, *self._robots):
             self._association.decide()
-        attend(prints, bodies, t, dt)
+        attend(prints, bodies, t, dt, self._association.scattered)
         scattered = self._association.scattered
         if exchange(bodies, prints, t, scattered) + release(bodies, prints, t):
             self._association.decide()

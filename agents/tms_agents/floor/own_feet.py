@@ -9,13 +9,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.gait import swap
-from tms_agents.floor.shine import ALIKE, alike, strangeness
+from tms_agents.floor.shine import ALIKE, STRANGE, alike, strangeness
 from tms_agents.floor.strays import nobodys
 
 Array = NDArray[np.float64]
 
-#: What differs in brightness from somebody's feet by so many standard deviations is none.
-_STRANGE = 4.0
 #: Two feet that stand are between these distances from each other (m), and from the body less than this (m); one has
 #: stood for so long (s), and is missing when not seen for so long (s).
 _BESIDE_M, _STANCE_M, _BODY_M, _STANDS_S, _MISSING_S = 0.06, 0.55, 0.6, 1.0, 0.5
@@ -58,7 +56,7 @@ def exchange(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
                 continue
             missing = t - body.b_seen > _MISSING_S
             q = prints[max(body.b_print, 0)]
-            strange = body.b_print >= 0 and not missing and strangeness(body, q, scattered) > _STRANGE
+            strange = body.b_print >= 0 and not missing and strangeness(body, q, scattered) > STRANGE
             if not missing and not strange:
                 continue
             own = _own(body, prints, body.ax, body.ay, t, scattered)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.freespace import FREE, WALLED, clear, silent
 from tms_agents.floor.gait import SHOES
+from tms_agents.floor.shine import STRANGE, strangeness
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ NEAR_M = 0.36
 _OFTEN, _SHOE_M, _LEG = 10, 0.07, (0.65, 1.6)
 #: What is so far (m) beside a robot that has rested for so long (s) is no part of it.
 _CLEAR_M, _PARKED_S = 0.06, 3.0
+#: What alone has been seen of somebody for so long (s), and is no more as bright as his feet, is none.
+_ALONE_S = 60.0
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
 
@@ -205,8 +208,11 @@ def unlike_foot(body: Any, q: Any) -> bool:
 
 
 @njit(cache=True)
-def attend(prints: Any, bodies: Any, t: float, dt: float) -> None:
-    """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy)."""
+def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array) -> None:
+    """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy).
+
+    ``scattered`` (3,) is what `shine.scatter` has learned.
+    """
     for b in range(bodies.size):
         body = bodies[b]
         body.still = 0.0
@@ -216,6 +222,9 @@ def attend(prints: Any, bodies: Any, t: float, dt: float) -> None:
         j = body.a_print if body.a_seen >= body.b_seen else body.b_print
         if body.used and j >= 0:
             body.older, body.odd = prints[j].idle, unlike_foot(body, prints[j])
+            alone = t - prints[j].first > _ALONE_S and t - min(body.a_seen, body.b_seen) > _ALONE_S
+            if alone and strangeness(body, prints[j], scattered) > STRANGE:
+                body.odd = 1
     for j in range(prints.size):
         q = prints[j]
         if not q.used:

@@ -18,9 +18,9 @@ Array = NDArray[np.float64]
 NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
-#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer, and nobody
-#: has left a foot so far (m) behind.
-_STEP_M, _STRIDE_M = 0.1, 0.9
+#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody leaves
+#: a foot so far (m) behind, but it may have come and be hidden here: time counts less.
+_STEP_M, _STRIDE_M, _SLOWER = 0.1, 0.9, 2.0
 #: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
 #: likely a thing: time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
@@ -205,17 +205,15 @@ def review(
             foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
             if _is_lone(body, t):
                 x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
-                behind = (
-                    t - at > 0.5
-                    and np.hypot(foot_x - x, foot_y - y) < _STRIDE_M
-                    and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
-                )
+                behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
                 if body.lone == 0.0:
                     body.lone_x, body.lone_y = foot_x, foot_y
                 if body.older > _OLDER_S:
                     body.lone += dt * _FASTER
                 elif not behind:
                     body.lone += dt * (_FASTER if body.odd else 1.0)
+                elif np.hypot(foot_x - x, foot_y - y) > _STRIDE_M:
+                    body.lone += dt / _SLOWER
             elif (
                 max(t - body.a_seen, t - body.b_seen) < 1.0
                 or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M

@@ -31,6 +31,8 @@ _BEST, _STEADY = 0.1, 0.03
 _KNOWN, _ALONE_M = 120, 0.8
 #: A print that was seen so often is known, and as bright as somebody's feet up to so many standard deviations.
 _OFTEN, ALIKE = 5, 2.5
+#: What differs in brightness from somebody's feet by so many standard deviations is none of them.
+STRANGE = 4.0
 
 
 def expected() -> Array:
