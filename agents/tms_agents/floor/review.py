@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
-#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody leaves
-#: a foot so far (m) behind, but it may have come and be hidden here: time counts less.
+#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody
+#: leaves a foot so far (m) behind, but it may have come and be hidden here: time counts less.
 _STEP_M, _STRIDE_M, _SLOWER = 0.1, 0.9, 2.0
 #: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
 #: likely a thing: time counts more.
