@@ -192,12 +192,15 @@ def test_a_tag_that_was_read_once_is_waited_for(first: float) -> None:
 
 
 @pytest.mark.parametrize("seconds", [1.6, 6.0, 40.0])
-@pytest.mark.parametrize("told", [True, False])
-def test_a_tag_is_that_of_what_was_put_while_the_board_delivered_nothing(seconds: float, told: bool) -> None:
+@pytest.mark.parametrize("why", ["silent", "told", "off"])
+def test_a_tag_is_that_of_what_was_put_while_the_board_delivered_nothing(seconds: float, why: str) -> None:
     bench = Bench()
     bench.load, bench.tags = 400 * share(0.2, 0.1), frozenset({"A"})
-    if told:  # the line says that the board is gone
+    if why == "told":  # the line says that the board is gone
         bench.estimator.load(bench.t, np.full(4, np.nan))
+    if why == "off":  # so was the agent, and the reader is back before the board
+        saved = json.loads(json.dumps(bench.estimator.to_dict()))
+        bench.estimator = CabinetEstimator.from_dict(saved, GEOMETRY, zones=ZONES)
     begin = bench.t
     while bench.t < begin + seconds:
         bench.t += 0.2
