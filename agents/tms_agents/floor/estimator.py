@@ -15,7 +15,7 @@ from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Area, Masks
-from tms_agents.floor.objects import OBJECT, Objects, candidates, near_movers
+from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.own_feet import exchange
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
@@ -38,8 +38,8 @@ _WAITS_S = 25.0
 _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
-#: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
-_FORMAT = 5
+#: Of saved states; 6: what rests and is watched for longer.
+_FORMAT = 6
 
 
 class FloorEstimator:
@@ -187,10 +187,7 @@ class FloorEstimator:
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED
             return []
-        who = candidates({mover: near for near, mover in near_movers(self._tracks.bodies, q["x"], q["y"])})
-        events = self._objects.born(q, self._new_label(), who, t)
-        q["used"] = 0
-        return events
+        return self._objects.born(index, self._prints, self._tracks.bodies, self._new_label(), t)
 
     def _protect(self, view: View, clusters: Any, of: NDArray[np.int64], somebodys: NDArray[np.bool_]) -> None:
         """What is somebody or something is not learned as background; furniture is, at once."""
@@ -234,6 +231,7 @@ class FloorEstimator:
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
+            "waiting": [[k, rested, who] for k, (rested, who) in self._objects.waiting.items()],
             "robot_at": self._objects.robot_at if np.isfinite(self._objects.robot_at) else None,
             "furniture": self._furniture.save(),
             "extrinsics": self._extrinsics.save(),
@@ -273,6 +271,9 @@ class FloorEstimator:
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
+            self._objects.waiting = {
+                int(k): (float(rested), tuple((int(m), float(p)) for m, p in who)) for k, rested, who in state["waiting"]
+            }
             self._objects.robot_at = -np.inf if state["robot_at"] is None else float(state["robot_at"])
             self._furniture.restore(state["furniture"])
             self._extrinsics.restore(state["extrinsics"])

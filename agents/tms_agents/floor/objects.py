@@ -9,18 +9,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.candidates import FAR_M, candidates, near_movers
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.own_feet import may_be_his
+from tms_agents.floor.patience import patience
 from tms_agents.floor.prints import HARDLY, lay_before
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
 
 #: What a print that rests turns out to be.
-OBJECT, FURNITURE = 1, 2
-#: How near who acts is (m, Gaussian), and who is too far to have acted.
-_ARM_M, _FAR_M = 0.5, 1.6
+OBJECT, FURNITURE, WAITS = 1, 2, 3
 #: Sure that a place is free: log likelihood ratio, at most so much of it per scan (scans resemble each other), and per
 #: scan that sees past the edge of what hides the thing.
 _SURE, _PER_SCAN, _PER_GLIMPSE = 7.5, 1.5, 1.0
@@ -210,7 +210,7 @@ def _ripe(
     scattered: Array,
     ripe: NDArray[np.int64],
 ) -> int:
-    """Prints that are an `OBJECT` or `FURNITURE` by now, into ``ripe``; how many."""
+    """Prints that are an `OBJECT` or `FURNITURE` by now, or will be one (`WAITS`), into ``ripe``; how many."""
     count = 0
     for j in range(prints.size):
         q = prints[j]
@@ -247,7 +247,7 @@ def _ripe(
         if _somebodys(q, prints, j, bodies, robots, t):
             continue
         if q.width < width_m:
-            ripe[j] = OBJECT
+            ripe[j] = OBJECT if t - q.rested >= patience(q, bodies, t, scattered) else WAITS
             count += 1
         elif alone and age > 2.0:
             ripe[j] = FURNITURE
@@ -263,6 +263,8 @@ class Objects:
         self._settings = settings
         #: For each object not seen now: label of a mover -> how near (m) it has been since the object was last seen.
         self.visitors: dict[int, dict[int, float]] = {}
+        #: For each print that waits: since when it has rested, and who was near when it seemed to be a thing.
+        self.waiting: dict[int, tuple[float, Candidates]] = {}
         #: When there was a robot.
         self.robot_at = -math.inf
         #: Which went by themselves in the last scan, nobody being near: when they were seen last, x, y (m).
@@ -280,7 +282,7 @@ class Objects:
         due = (self.things["used"] == 1) & (self.things["free"] >= self._settings.free_s - 0.05)
         for index in np.flatnonzero(due & (self.things["doubt"] >= _SURE - 1e-9)).tolist():
             thing = self.things[index]
-            who = _candidates(self.visitors.pop(int(thing["label"]), {}))
+            who = candidates(self.visitors.pop(int(thing["label"]), {}))
             events.append(Vanished(t, int(thing["label"]), float(thing["seen"]), t, who))
             thing["used"] = 0
             if not who:
@@ -309,10 +311,16 @@ class Objects:
             self._ripe,
         ):
             return []
-        return [(j, int(self._ripe[j])) for j in np.flatnonzero(self._ripe).tolist()]
+        found = [(j, int(self._ripe[j])) for j in np.flatnonzero(self._ripe).tolist()]
+        self.waiting = {j: one for j, one in self.waiting.items() if prints[j]["used"] and prints[j]["rested"] == one[0]}
+        for j, kind in found:
+            if kind == WAITS and j not in self.waiting:
+                self.waiting[j] = float(prints[j]["rested"]), candidates(near_movers(bodies, prints[j]))
+        return [(j, kind) for j, kind in found if kind != WAITS]
 
-    def born(self, print_: Any, label: int, who: Candidates, t: float) -> list[FloorEvent]:
-        """The print is an object."""
+    def born(self, index: int, prints: Any, bodies: Any, label: int, t: float) -> list[FloorEvent]:
+        """The print ``index`` is an object."""
+        print_ = prints[index]
         slot = int(self.things["used"].argmin())
         thing = self.things[slot]
         if thing["used"]:
@@ -326,7 +334,9 @@ class Objects:
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
         thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))
+        _, who = self.waiting.pop(index, None) or (0.0, candidates(near_movers(bodies, print_)))
         since, width = float(thing["since"]), float(print_["width"])
+        print_["used"] = 0
         return [Appeared(t, label, "object", _xy(thing), _cov(thing), False, since, who, width)]
 
     def at(self, print_: Any) -> bool:
@@ -358,7 +368,7 @@ class Objects:
         movers = bodies["label"][present].tolist()
         rows = zip(self.things["label"][used].tolist(), self.things["seen"][used].tolist(), away.tolist(), strict=True)
         for label, seen, gaps in rows:
-            near = [(gap, mover) for gap, mover in zip(gaps, movers, strict=True) if gap < _FAR_M]
+            near = [(gap, mover) for gap, mover in zip(gaps, movers, strict=True) if gap < FAR_M]
             if seen == t:
                 # Whoever was near when it was last seen: kept from this scan on.
                 self.visitors.pop(label, None)
@@ -367,23 +377,6 @@ class Objects:
             visitors = self.visitors.setdefault(label, {})
             for gap, mover in near:
                 visitors[mover] = min(gap, visitors.get(mover, math.inf))
-
-
-def near_movers(bodies: Any, x: float, y: float) -> list[tuple[float, int]]:
-    """How far (m) each mover is that could reach (x, y), and its label."""
-    present = (bodies["used"] == 1) & (bodies["confirmed"] == 1)
-    away = np.hypot(bodies["x"] - x, bodies["y"] - y)
-    return [(float(away[b]), int(bodies["label"][b])) for b in np.flatnonzero(present & (away < _FAR_M)).tolist()]
-
-
-def _candidates(visitors: dict[int, float]) -> Candidates:
-    """Who acted, by how near each came; the remainder is that it was nobody known."""
-    weights = {mover: math.exp(-(near**2) / (2 * _ARM_M**2)) for mover, near in visitors.items()}
-    total = sum(weights.values()) + 0.02
-    return tuple(sorted(((mover, w / total) for mover, w in weights.items()), key=lambda item: (-item[1], item[0])))
-
-
-candidates = _candidates
 
 
 def _xy(thing: Any) -> tuple[float, float]:

@@ -46,7 +46,7 @@ def test_what_is_as_wide_as_a_shoe_from_its_side_waits() -> None:
 def test_it_waits_for_longer_where_somebody_stood_on_it() -> None:
     assert not told(resting(20.0, width=0.22, owned=NOW - 5.0, busy=NOW - 5.0))
     assert told(resting(20.0, width=0.12, owned=NOW - 5.0, busy=NOW - 5.0))
-    assert told(resting(30.0, width=0.22, owned=NOW - 9.0, busy=NOW - 9.0))
+    assert told(resting(30.0, width=0.22, owned=NOW - 12.0, busy=NOW - 12.0))
 
 
 def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
