@@ -32,14 +32,14 @@ Array = NDArray[np.float64]
 #: As many as there can be at once.
 _BODIES, _PRINTS, _THINGS = 32, 192, 128
 _DARK = np.zeros(0)
-#: In a door somebody may wait for so long (s).
-_WAITS_S = 25.0
+#: In a door somebody may wait for so long (s); for so long if somebody known had been there, who may have put it there.
+_WAITS_S, _STOPS_S = 25.0, 8.0
 #: So long (s) after the room was learned, slivers of it are no things.
 _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
-#: Of saved states; 6: what rests and is watched for longer.
-_FORMAT = 6
+#: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
+_FORMAT = 5
 
 
 class FloorEstimator:
@@ -170,7 +170,8 @@ class FloorEstimator:
         x, y = float(q["x"]), float(q["y"])
         if self._masks.outside(x, y) or (kind == OBJECT and self._objects.at(q)):
             return []
-        waits = kind == OBJECT and not q["given"] and t - q["first"] < _WAITS_S and self._gates.distance(x, y) == 0.0
+        waits_s = _WAITS_S if q["busy"] < q["rested"] else _STOPS_S
+        waits = kind == OBJECT and not q["given"] and t - q["first"] < waits_s and self._gates.distance(x, y) == 0.0
         if waits and not self._tracks.elsewhere(int(q["whose"]), x, y, t):
             return []
         started = min(view.background.seconds for view in self._views.values())
@@ -272,7 +273,8 @@ class FloorEstimator:
             self._objects.things[:] = unpack(state["things"], self._objects.things)
             self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
             self._objects.waiting = {
-                int(k): (float(rested), tuple((int(m), float(p)) for m, p in who)) for k, rested, who in state["waiting"]
+                int(k): (float(rested), tuple((int(m), float(p)) for m, p in who))
+                for k, rested, who in state.get("waiting", ())
             }
             self._objects.robot_at = -np.inf if state["robot_at"] is None else float(state["robot_at"])
             self._furniture.restore(state["furniture"])
