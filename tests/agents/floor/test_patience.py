@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from tms_agents.floor import FloorSettings
@@ -37,15 +39,22 @@ def test_what_nobody_stood_on_and_all_of_which_is_seen_is_told_at_once() -> None
 
 
 def test_what_was_never_seen_whole_may_be_a_leg_behind_another() -> None:
-    assert wanted(whole=0) > 15.0
+    assert wanted(whole=0) > 10.0
     assert wanted(whole=0, mutes=10) == 0.0  # glossy
     assert wanted(whole=0, given=1) > 10.0
 
 
 def test_whose_foot_it_was_has_gone_if_both_his_feet_are_seen_elsewhere() -> None:
     assert wanted(2.0, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) == 0.0
-    assert wanted(0.5, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) > 15.0
-    assert wanted(2.0, whole=0, whose=7, owned=NOW - 2.0, busy=NOW - 2.0) > 15.0
+    assert wanted(0.5, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) > 10.0
+    assert wanted(2.0, whole=0, whose=7, owned=NOW - 2.0, busy=NOW - 2.0) > 10.0
+
+
+def test_where_somebody_stood_for_long_he_is_waited_for_until_he_is_seen_elsewhere() -> None:
+    stood = {"first": NOW - 60.0, "rested": NOW - 60.0, "whose": 1, "owned": NOW - 9.0, "busy": NOW - 9.0}
+    assert wanted(0.5, **stood) == math.inf
+    assert wanted(2.0, **stood) == 0.0
+    assert wanted(0.5, **(stood | {"owned": NOW - 31.0})) == 0.0
 
 
 @pytest.mark.parametrize(

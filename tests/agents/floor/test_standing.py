@@ -53,7 +53,7 @@ def test_what_is_put_down_beside_who_stands_is_a_thing_and_he_stays(xy: tuple[fl
 
 
 def test_what_lay_between_his_feet_is_a_thing_when_he_has_gone() -> None:
-    estimator, events = Room(together(walker(WAY), thing(2.2, 2.0, 0.04, 100.0))).play(LEAVES + 70.0)
+    estimator, events = Room(together(walker(WAY), thing(2.2, 2.0, 0.04, 100.0))).play(LEAVES + 40.0)
     assert len(born(events, "mover")) == 1
     (left,) = estimator.labels()
     assert left.kind == "object"

@@ -146,11 +146,11 @@ def test_who_has_stood_for_long_has_not_stepped_to_where_somebody_passes(stood: 
 
 @pytest.mark.parametrize(
     ("owned", "since", "left", "thing"),
-    [(30.0, 4.0, True, False), (30.0, 9.0, True, True), (30.0, 9.0, False, False), (30.0, 61.0, False, True)]
-    + [(2.0, 4.0, True, True), (2.0, 4.0, False, False), (2.0, 14.0, False, True)],
+    [(30.0, 4.0, True, False), (30.0, 9.0, True, True), (30.0, 9.0, False, False), (30.0, 31.0, False, True)]
+    + [(2.0, 4.0, True, True), (2.0, 4.0, False, True)],
 )
 def test_where_somebody_stood_he_is_waited_for(owned: float, since: float, left: bool, thing: bool) -> None:
-    """For longer where he stood for long, and where he is not seen to be elsewhere."""
+    """If he had stood there for long, and longer if he is not seen to be elsewhere."""
     prints, bodies = empty(PRINT, 1), empty(BODY, 1)
     values = {"used": 1, "first": NOW - owned - since, "rested": NOW - owned - since, "last": NOW, "width": 0.08}
     values |= {"owner": -1, "whose": 1, "owned": NOW - since, "busy": NOW - since, "silent": -1e9}
