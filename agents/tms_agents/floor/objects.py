@@ -312,7 +312,8 @@ class Objects:
         ):
             return []
         found = [(j, int(self._ripe[j])) for j in np.flatnonzero(self._ripe).tolist()]
-        self.waiting = {j: one for j, one in self.waiting.items() if prints[j]["used"] and prints[j]["rested"] == one[0]}
+        there = {j: float(prints[j]["rested"]) for j in self.waiting if prints[j]["used"]}
+        self.waiting = {j: one for j, one in self.waiting.items() if there.get(j) == one[0]}
         for j, kind in found:
             if kind == WAITS and j not in self.waiting:
                 self.waiting[j] = float(prints[j]["rested"]), candidates(near_movers(bodies, prints[j]))
@@ -321,6 +322,7 @@ class Objects:
     def born(self, index: int, prints: Any, bodies: Any, label: int, t: float) -> list[FloorEvent]:
         """The print ``index`` is an object."""
         print_ = prints[index]
+        print_["used"] = 0
         slot = int(self.things["used"].argmin())
         thing = self.things[slot]
         if thing["used"]:
@@ -334,9 +336,8 @@ class Objects:
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))
         thing["solid"] = min(0.99, max(0.5, (hits + mutes) / max(looks + mutes, 1)))
-        _, who = self.waiting.pop(index, None) or (0.0, candidates(near_movers(bodies, print_)))
+        _, who = self.waiting.pop(index, (0.0, candidates(near_movers(bodies, print_))))
         since, width = float(thing["since"]), float(print_["width"])
-        print_["used"] = 0
         return [Appeared(t, label, "object", _xy(thing), _cov(thing), False, since, who, width)]
 
     def at(self, print_: Any) -> bool:

@@ -13,8 +13,8 @@ from tms_agents.floor.shine import strangeness
 
 #: What may be a foot is watched for so long (s): most people move one within this time.
 _WATCHED_S = 12.0
-#: What a hand has put there may be one if it is as wide as a shoe from its side (m), so near somebody (m) that it may be
-#: under him, as bright as the feet (standard deviations) of somebody beside it (m), or was somebody's just now (s).
+#: What a hand has put there may be one if it is as wide as a shoe from its side (m), so near somebody (m) that it may
+#: be under him, as bright as the feet (standard deviations) of somebody beside it (m), or was somebody's just now (s).
 _SIDE_M, _UNDER_M, _LIKE, _BESIDE_M, _NOW_S = 0.17, 0.3, 1.0, 0.6, 0.2
 #: Of a leg behind somebody else's one sees a part. What is black or glossy is hardly ever seen whole either, and silent
 #: in so many scans.

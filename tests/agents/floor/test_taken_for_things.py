@@ -146,8 +146,10 @@ def test_who_has_stood_for_long_has_not_stepped_to_where_somebody_passes(stood: 
 
 @pytest.mark.parametrize(
     ("owned", "since", "left", "thing"),
-    [(30.0, 4.0, True, False), (30.0, 9.0, True, True), (30.0, 9.0, False, False), (30.0, 31.0, False, True)]
-    + [(2.0, 4.0, True, True), (2.0, 4.0, False, True)],
+    [
+        *((30.0, 4.0, True, False), (30.0, 9.0, True, True), (30.0, 9.0, False, False), (30.0, 31.0, False, True)),
+        *((2.0, 4.0, True, True), (2.0, 4.0, False, True)),
+    ],
 )
 def test_where_somebody_stood_he_is_waited_for(owned: float, since: float, left: bool, thing: bool) -> None:
     """If he had stood there for long, and longer if he is not seen to be elsewhere."""
