@@ -39,7 +39,8 @@ class Span:
 
     ``met_s``: for how long any beam met it; ``clear_s``: for how long two did at once.
     ``latency_s`` from when it could be seen; ``kept_s`` of ``hidden_s`` the label was there although nothing met the
-    thing for a second or more; ``removal_s`` from when its place was clear, NaN where it stayed or that is unknown.
+    thing for a second or more, ``known_s`` of them since it was told first; ``removal_s`` from when its place was
+    clear, NaN where it stayed or that is unknown.
     """
 
     thing: str
@@ -53,6 +54,7 @@ class Span:
     coverage: float = math.nan
     kept_s: float = 0.0
     hidden_s: float = 0.0
+    known_s: float = 0.0
     removal_s: float = math.nan
 
     @property
@@ -113,6 +115,12 @@ class ObjectScores:
         """Share of the time hidden."""
         hidden = sum(span.hidden_s for span in self.spans)
         return sum(span.kept_s for span in self.spans) / hidden if hidden > 0 else math.nan
+
+    @property
+    def held(self) -> float:
+        """Share of the time hidden since it was told first."""
+        known = sum(span.known_s for span in self.spans)
+        return sum(span.kept_s for span in self.spans) / known if known > 0 else math.nan
 
     @property
     def breaks(self) -> int:
@@ -240,6 +248,7 @@ def _followed(
         coverage=float(told.mean()) if len(wanted) else math.nan,
         kept_s=float((told & hidden).sum() * step),
         hidden_s=float(hidden.sum() * step),
+        known_s=float((hidden & (wanted >= min(track[0, 0] for track in mine))).sum() * step),
         removal_s=float(gone - span["first_clear"]) if span["t_picked"] and span["first_clear"] else math.nan,
     )
 

@@ -98,6 +98,7 @@ def requirements_table(every: Mapping[tuple[str, str, str], Sequence[Scores]]) -
     row("recall of black and glossy things", ("glossy",), "recall")
     row("found of those in sight for less than 2 s", None, "glimpsed")
     row("kept while hidden >= 0.99", plain, "kept")
+    row("the same, once it was told", plain, "held")
     row("false objects <= 1 in 10 minutes, without furniture", None, "false")
     row("false objects <= 1 per furniture move", None, "move")
     row("removal <= 1 s after it can be seen", plain, "removal_s")
@@ -116,6 +117,8 @@ def _asked(value: str, scores: Sequence[Scores]) -> str:
         return f"{sum(span.found for span in objects.glimpsed)} of {len(objects.glimpsed)}"
     if value == "kept":
         return f"{number(objects.kept, 3)} of {sum(span.hidden_s for span in objects.spans):.0f} s"
+    if value == "held":
+        return f"{number(objects.held, 3)} of {sum(span.known_s for span in objects.spans):.0f} s"
     if value == "false":
         return number(objects.per_ten_minutes("mover", "other"))
     if value == "move":

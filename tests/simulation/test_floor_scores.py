@@ -145,12 +145,22 @@ def test_a_label_kept_while_the_thing_is_hidden_and_too_long_after_it_is_gone() 
     label = {"id": 1, "attr": "object", "x": span["x"] + 0.03, "y": span["y"] - 0.04}
     frames = [{"t": t, "labels": [label] if 4.0 <= t <= 30.0 and not 15 < t <= 20 else []} for t in truth["t"]]
     objects = scores.score(truth, frames).objects
-    assert objects.kept == pytest.approx(0.5, abs=0.02)
+    assert objects.kept == objects.held == pytest.approx(0.5, abs=0.02)
     assert objects.median("latency_s") == pytest.approx(4.0 - span["first_visible"])
     assert objects.median("error_m") == pytest.approx(0.05)
     assert objects.median("removal_s") == pytest.approx(4.0)
     assert objects.stale == 1
     assert not objects.false
+
+
+def test_what_was_told_while_it_was_hidden_has_been_kept_since() -> None:
+    truth = strolls(np.random.default_rng(4), people=0, seconds=40.0)
+    (span,) = truth["objects"][0]["spans"]
+    span.update(occluded=[[10.0, 20.0]])
+    label = {"id": 1, "attr": "object", "x": span["x"], "y": span["y"]}
+    objects = scores.score(truth, [{"t": t, "labels": [label] if t > 16.0 else []} for t in truth["t"]]).objects
+    assert objects.kept == pytest.approx(0.4, abs=0.02)
+    assert objects.held == pytest.approx(1.0)
 
 
 def test_what_was_hardly_ever_in_sight_counts_neither_way() -> None:

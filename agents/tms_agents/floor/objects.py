@@ -247,7 +247,8 @@ def _ripe(
         if _somebodys(q, prints, j, bodies, robots, t):
             continue
         if q.width < width_m:
-            ripe[j] = OBJECT if t - q.rested >= patience(q, bodies, t, scattered) else WAITS
+            told = astride or t - q.rested >= patience(q, bodies, t, scattered)
+            ripe[j] = OBJECT if told else WAITS
             count += 1
         elif alone and age > 2.0:
             ripe[j] = FURNITURE
