@@ -17,6 +17,7 @@ from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.own_feet import exchange
+from tms_agents.floor.patience import has_left
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
@@ -172,7 +173,7 @@ class FloorEstimator:
             return []
         waits_s = _WAITS_S if q["busy"] < q["rested"] else _STOPS_S
         waits = kind == OBJECT and not q["given"] and t - q["first"] < waits_s and self._gates.distance(x, y) == 0.0
-        if waits and not self._tracks.elsewhere(int(q["whose"]), x, y, t):
+        if waits and not has_left(q, self._tracks.bodies, t):
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s

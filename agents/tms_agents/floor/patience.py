@@ -39,7 +39,7 @@ def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> f
         return _WATCHED_S if hardly or foot else 0.0
     if q.attached > _JOINED:
         return _JOINED_S
-    gone = _has_left(q, bodies, t)
+    gone = has_left(q, bodies, t)
     if q.owned - q.first > _HIS_S and t - q.owned < _STILL_S and not gone:
         return np.inf
     return _WATCHED_S if t - q.busy < _NOW_S or (hardly and not gone) else 0.0
@@ -59,7 +59,7 @@ def _may_be_foot(q: Any, bodies: Any, scattered: NDArray[np.float64]) -> bool:
 
 
 @njit(cache=True)
-def _has_left(q: Any, bodies: Any, t: float) -> bool:
+def has_left(q: Any, bodies: Any, t: float) -> bool:
     """Whether whose foot the print was taken for stands or walks elsewhere."""
     for b in range(bodies.size):
         body = bodies[b]

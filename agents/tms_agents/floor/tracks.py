@@ -135,14 +135,6 @@ class Tracks:
             if body["used"] and body["confirmed"]
         ]
 
-    def elsewhere(self, label: int, x: float, y: float, t: float) -> bool:
-        """Whether the mover with the label is seen, and nowhere near (x, y)."""
-        for body in self.bodies:
-            if body["used"] and body["confirmed"] and body["label"] == label:
-                away = math.hypot(body["x"] - x, body["y"] - y) > _STRIDE_M
-                return bool(away and not body["stale"] and t - body["seen"] < self._settings.stale_s)
-        return False
-
     def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
         """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
         self.strides += [(*one, t + _BY_ITSELF_S) for one in walked]

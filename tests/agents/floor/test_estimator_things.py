@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -51,6 +52,15 @@ def test_nobody_has_three_feet() -> None:
     (put,) = born(events, "object")
     assert math.hypot(put.xy[0] - 1.85, put.xy[1] - 2.0) < 0.02
     assert put.t < 25.0
+
+
+def test_what_is_watched_survives_a_restart() -> None:
+    room = Room(together(walker(STAYS), thing(1.85, 2.0, 0.05, 11.4)))
+    estimator, _ = room.play(18.0)
+    saved = estimator.to_dict()
+    assert saved["waiting"]
+    again = FloorEstimator.from_dict(json.loads(json.dumps(saved)), room.sensors)
+    assert json.dumps(again.to_dict()) == json.dumps(saved)
 
 
 def test_feet_that_stand_for_long_are_no_things() -> None:
