@@ -14,6 +14,7 @@ from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
+from tms_agents.floor.gait import count_shoes, legs
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.own_feet import exchange
@@ -61,6 +62,7 @@ class FloorEstimator:
         self._gates = Area(self._scene.gates)
         self._prints = empty(PRINT, _PRINTS)
         self._association = Association(_BODIES)
+        self._shoes = legs()
         self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
@@ -135,9 +137,10 @@ class FloorEstimator:
         note(prints, clusters, of, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
+        count_shoes(bodies, clusters[:feet], of[:feet], t, self._shoes)
         if recognize(bodies, *self._robots):
             self._association.decide()
-        attend(prints, bodies, t, dt, self._association.scattered)
+        attend(prints, bodies, t, dt, self._association.scattered, self._shoes)
         scattered = self._association.scattered
         if exchange(bodies, prints, t, scattered) + release(bodies, prints, t):
             self._association.decide()
@@ -228,6 +231,7 @@ class FloorEstimator:
             "format": _FORMAT,
             "sensors": sensors,
             "association": self._association.save(),
+            "shoes": pack(self._shoes),
             "absent": self._tracks.absent.save(),
             "strides": self._tracks.strides,
             "prints": pack(self._prints),
@@ -268,6 +272,8 @@ class FloorEstimator:
                 view.last = saved["last"]
                 view.move(tuple(saved["pose"]))
             self._association.restore(state["association"])
+            if "shoes" in state:
+                self._shoes[:] = unpack(state["shoes"], self._shoes)
             self._tracks.absent.restore(state["absent"])
             self._tracks.strides = [(float(t), float(x), float(y), float(u)) for t, x, y, u in state.get("strides", ())]
             self._prints[:] = unpack(state["prints"], self._prints)

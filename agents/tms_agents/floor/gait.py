@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 #: A foot that moved by so much (m) since the last scan swings; a stance elsewhere than the last (m) is another one.
 _SWING_M, _STANCE_M = 0.05, 0.12
@@ -18,13 +19,22 @@ _SWING_M, _STANCE_M = 0.05, 0.12
 _ROLL_M, SHOES, _SHOE_M = 0.17, 0.3, (0.16, 0.34)
 #: Legs are measured while somebody walks faster than this (m/s): nothing else does.
 _WALKS = 0.4
+#: Legs are expected as if so many had been seen; so many feet are remembered.
+_EXPECTED, _LONG = 20.0, 1000.0
 #: A foot stands and swings for so long (s) while somebody walks.
 _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 #: So many stances tell somebody's beat of late, and his own.
 _PACE_MEMORY, _PACE_LIFE = 12, 80
 #: Whose name is less sure does not change what is known of the name.
 SURE = 0.6
+#: Where shoes are seen, at least this share of all feet that walk is as wide as one (of legs it is 0.03 at most).
+SHOD = 0.2
 NOTHING = (0.0, 0.0, np.inf, 0.0, 0.0, np.inf)
+
+
+def legs() -> NDArray[np.float64]:
+    """What is known of feet before anybody was seen, as `count_shoes` learns it."""
+    return np.array([0.0, _EXPECTED])
 
 
 @njit(cache=True)
@@ -98,6 +108,23 @@ def shod(body: Any, c: Any) -> None:
         body.shoe += 0.04 * ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - body.shoe)
         if np.hypot(body.vx, body.vy) > _WALKS:
             body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
+
+
+@njit(cache=True)
+def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, shoes: NDArray[np.float64]) -> None:
+    """Learn from everybody who walks whether this laser sees shoes or legs: ``of`` (m,), the prints of the clusters.
+
+    ``shoes`` (2,): of the feet, the share as wide as a shoe from its side, and how many were seen.
+    """
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not body.used or not body.confirmed or body.robot or body.seen < t or np.hypot(body.vx, body.vy) < _WALKS:
+            continue
+        for i in range(clusters.size):
+            c = clusters[i]
+            if of[i] >= 0 and not c.cut and (body.a_print == of[i] or body.b_print == of[i]):
+                shoes[1] = min(shoes[1] + 1.0, _LONG)
+                shoes[0] += ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - shoes[0]) / shoes[1]
 
 
 @njit(cache=True)

@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.gait import swap
 from tms_agents.floor.shine import ALIKE, STRANGE, alike, strangeness
-from tms_agents.floor.strays import nobodys
+from tms_agents.floor.strays import nobodys, take
 
 Array = NDArray[np.float64]
 
 #: Two feet that stand are between these distances from each other (m), and from the body less than this (m); one has
 #: stood for so long (s), and is missing when not seen for so long (s).
 _BESIDE_M, _STANCE_M, _BODY_M, _STANDS_S, _MISSING_S = 0.06, 0.55, 0.6, 1.0, 0.5
+#: What has stood for so long (s) and is so strange is no foot.
+_STRANGE_S = 3.0
 
 
 @njit(cache=True)
@@ -38,8 +40,9 @@ def _own(body: Any, prints: Any, x: float, y: float, t: float, scattered: Array)
 def exchange(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
     """Give those of ``bodies`` (n,) that stand on a thing, or on one foot alone, their own foot among ``prints`` back.
 
-    The thing is much brighter or darker than the feet of the body ever were, the print beside it is not; ``scattered``
-    (3,) is what `shine.scatter` has learned. How many there are.
+    The thing is much brighter or darker than the feet of the body ever were, the print beside it is not. If there is
+    none, his own foot is hidden: he stands on the other. ``scattered`` (3,) is what `shine.scatter` has learned. How
+    many there are.
     """
     count = 0
     for b in range(bodies.size):
@@ -60,6 +63,11 @@ def exchange(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
             if not missing and not strange:
                 continue
             own = _own(body, prints, body.ax, body.ay, t, scattered)
+            if own < 0 and strange and t - q.first > _STRANGE_S and nobodys(q, body.b_land):
+                # His own is hidden.
+                take(body, q)
+                count += 1
+                break
             if own < 0 or (missing and (prints[own].whose != body.label or prints[own].given)):
                 continue
             if strange:

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.freespace import FREE, WALLED, clear, silent
-from tms_agents.floor.gait import SHOES
+from tms_agents.floor.gait import SHOD, SHOES
 from tms_agents.floor.shine import STRANGE, strangeness
 
 Array = NDArray[np.float64]
@@ -43,6 +43,10 @@ _OFTEN, _SHOE_M, _LEG = 10, 0.07, (0.65, 1.6)
 _CLEAR_M, _PARKED_S = 0.06, 3.0
 #: What alone has been seen of somebody for so long (s), and is no more as bright as his feet, is none.
 _ALONE_S = 60.0
+#: A shoe that looks narrower (m) than from its side cannot hide the other one for so long (s).
+_HIDES_M, _HIDES_S = 0.2, 6.0
+#: Why what is seen of somebody is no foot (`odd`): it is not like his feet; the other would be seen beside it.
+UNLIKE, ALONE = 1, 2
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
 
@@ -208,11 +212,19 @@ def unlike_foot(body: Any, q: Any) -> bool:
 
 
 @njit(cache=True)
-def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array) -> None:
+def _hides_none(q: Any, other_seen: float, t: float) -> bool:
+    """Whether the print, if a shoe, is seen from its tip or heel: it cannot have hidden the other one for so long."""
+    alone = t - max(q.rested, other_seen) > _HIDES_S
+    return bool(alone and q.width < _HIDES_M and 2 * q.covered < q.hits)
+
+
+@njit(cache=True)
+def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoes: Array) -> None:
     """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy).
 
-    ``scattered`` (3,) is what `shine.scatter` has learned.
+    ``scattered`` (3,) is what `shine.scatter` has learned, ``shoes`` (2,) what `gait.count_shoes` has.
     """
+    shod = shoes[0] > SHOD
     for b in range(bodies.size):
         body = bodies[b]
         body.still = 0.0
@@ -224,7 +236,9 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array) -> N
             body.older, body.odd = prints[j].idle, unlike_foot(body, prints[j])
             alone = t - prints[j].first > _ALONE_S and t - min(body.a_seen, body.b_seen) > _ALONE_S
             if alone and strangeness(body, prints[j], scattered) > STRANGE:
-                body.odd = 1
+                body.odd = UNLIKE
+            if shod and _hides_none(prints[j], min(body.a_seen, body.b_seen), t):
+                body.odd = ALONE
     for j in range(prints.size):
         q = prints[j]
         if not q.used:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.bodies import misled
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.gait import SHOES
+from tms_agents.floor.prints import ALONE
 
 Array = NDArray[np.float64]
 
@@ -210,8 +211,8 @@ def review(
                     body.lone_x, body.lone_y = foot_x, foot_y
                 if body.older > _OLDER_S:
                     body.lone += dt * _FASTER
-                elif not behind:
-                    body.lone += dt * (_FASTER if body.odd else 1.0)
+                elif not behind or body.odd == ALONE:
+                    body.lone += dt * (_FASTER if body.odd and not behind else 1.0)
                 elif np.hypot(foot_x - x, foot_y - y) > _STRIDE_M:
                     body.lone += dt / _SLOWER
             elif (

@@ -60,8 +60,8 @@ PRINT = np.dtype(
 #: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
 #: who it is (look, pace), and of the one whose name it has (own, own_pace); sure is how likely that name is. Further:
 #: for how long (s) and where it has stood on one foot alone (lone), for how long what it stands on had been nobody's
-#: before (older, s), where and since when it has stayed (rest), how wide the
-#: legs are (m, 0: unknown), whether what is seen of it is as wide as no foot (odd).
+#: before (older, s), where and since when it has stayed (rest), how wide the legs are (m, 0: unknown), whether what is
+#: seen of it is no foot, and why (odd, `prints.UNLIKE`).
 BODY = np.dtype(
     [
         ("used", "i8"),

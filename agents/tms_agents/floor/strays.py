@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from tms_agents.floor.gait import SHOES
+from tms_agents.floor.gait import SHOES, swap
 from tms_agents.floor.prints import unlike_foot
 
 #: Nobody stands with the shoes or the legs so far apart (m) for so long (s).
@@ -46,6 +46,15 @@ def nobodys(q: Any, landed: float) -> int:
 
 
 @njit(cache=True)
+def take(body: Any, q: Any) -> None:
+    """The print is not the second foot of the body, which stands on the first alone."""
+    q.given = nobodys(q, body.b_land)
+    body.b_print, body.b_seen = -1, body.a_land
+    body.bx, body.by = body.ax, body.ay
+    body.x, body.y = body.ax, body.ay
+
+
+@njit(cache=True)
 def release(bodies: Any, prints: Any, t: float) -> int:
     """Take from those of ``bodies`` (n,) that stand on a thing, one of ``prints``, this foot; how many there are."""
     count = 0
@@ -58,12 +67,8 @@ def release(bodies: Any, prints: Any, t: float) -> int:
             continue
         count += 1
         if stray == 1:
-            prints[body.a_print].given = nobodys(prints[body.a_print], body.a_land)
-            body.a_print, body.a_seen = -1, body.b_land
-            body.ax, body.ay = body.bx, body.by
-        else:
-            prints[body.b_print].given = nobodys(prints[body.b_print], body.b_land)
-            body.b_print, body.b_seen = -1, body.a_land
-            body.bx, body.by = body.ax, body.ay
-        body.x, body.y = body.ax, body.ay
+            swap(body)
+        take(body, prints[body.b_print])
+        if stray == 1:
+            swap(body)
     return count

@@ -54,6 +54,20 @@ def test_a_thing_is_exchanged_for_his_own_foot_beside_it(shines: tuple[float, ..
     assert prints["given"].tolist() == [0, int(foot == 2), 0]
 
 
+@pytest.mark.parametrize(
+    ("shine", "stood", "idle", "foot"),
+    [(OTHER, 4.0, 0.0, -1), (OTHER, 2.0, 0.0, 1), (HIS, 4.0, 0.0, 1), (OTHER, 9.0, 0.0, 1), (OTHER, 9.0, 5.0, -1)],
+)
+def test_a_thing_is_not_his_foot_while_his_own_is_hidden(shine: float, stood: float, idle: float, foot: int) -> None:
+    """Unless somebody else had stood there before: then the names may have been exchanged."""
+    bodies, prints = stands(), resting(HIS, shine, OTHER)
+    prints["first"][1], prints["idle"][1] = NOW - stood, idle
+    assert exchange(bodies, prints, NOW, expected()) == (foot < 0)
+    assert bodies["b_print"][0] == foot
+    assert prints["given"].tolist() == [0, int(foot < 0), 0]
+    assert bodies["x"][0] == (bodies["ax"][0] if foot < 0 else 0.0)
+
+
 @pytest.mark.parametrize(("given", "foot"), [(0, 2), (1, -1)])
 def test_a_foot_that_is_missing_is_what_was_his_unless_a_hand_put_it_there(given: int, foot: int) -> None:
     bodies, prints = stands(), resting(HIS, HIS, HIS)

@@ -9,8 +9,9 @@ from floor_rooms import Circle, Room
 from tms_agents.floor import Appeared
 from tms_agents.floor.background import BACKGROUND, FOREGROUND
 from tms_agents.floor.bodies import stuck
+from tms_agents.floor.gait import SHOD, legs
 from tms_agents.floor.objects import OBJECT, Objects
-from tms_agents.floor.prints import attend, follow, lay_before
+from tms_agents.floor.prints import ALONE, UNLIKE, attend, follow, lay_before
 from tms_agents.floor.review import LOST, review
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.settings import FloorSettings
@@ -131,8 +132,35 @@ def test_what_alone_is_seen_of_somebody_must_be_as_bright_as_his_feet(shine: flo
     values = {"used": 1, "first": NOW - alone, "last": NOW, "width": 0.1, "hits": 300, "shine": shine, "shine_n": 40}
     for name, value in values.items():
         prints[name] = value
-    attend(prints, bodies, NOW, 0.1, expected())
+    attend(prints, bodies, NOW, 0.1, expected(), legs())
     assert bodies["odd"][0] == odd
+
+
+@pytest.mark.parametrize(
+    ("width", "alone", "covered", "shoes", "odd"),
+    [
+        *((0.12, 8.0, 0, 0.6, ALONE), (0.25, 8.0, 0, 0.6, 0), (0.12, 4.0, 0, 0.6, 0), (0.12, 8.0, 70, 0.6, 0)),
+        (0.12, 8.0, 0, 0.5 * SHOD, 0),
+    ],
+)
+def test_a_shoe_seen_from_its_tip_does_not_hide_the_other(
+    width: float, alone: float, covered: int, shoes: float, odd: int
+) -> None:
+    bodies, prints = standing(2.0, 2.2), empty(PRINT, 1)
+    bodies["a_seen"], bodies["b_seen"], bodies["b_print"] = NOW, NOW - alone, -1
+    values = {"used": 1, "first": NOW - 1.0, "rested": NOW - alone, "last": NOW, "width": width, "hits": 80}
+    for name, value in (values | {"covered": covered}).items():
+        prints[name] = value
+    attend(prints, bodies, NOW, 0.1, expected(), np.array([shoes, 500.0]))
+    assert bodies["odd"][0] == odd
+
+
+@pytest.mark.parametrize(("odd", "lost"), [(0, False), (UNLIKE, False), (ALONE, True)])
+def test_who_would_stand_on_one_shoe_is_somewhere_else(odd: int, lost: bool) -> None:
+    """Also where the other shoe was seen last is behind it, which hides it only if it is wide."""
+    bodies = standing(2.0, 2.2)
+    bodies["odd"] = odd
+    assert (LOST in found(bodies, 8.0, COVERED)) == lost
 
 
 @pytest.mark.parametrize(("stood", "lost"), [(60.0, False), (5.0, True)])
