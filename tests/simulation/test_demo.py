@@ -109,11 +109,11 @@ def test_a_laser_sees_the_floor(tmp_path: Path) -> None:
     """Raw scans of an emulated laser to the pies, as the demo is started by most."""
     done = tms_demo("--once", "--port", "0", "--data-dir", str(tmp_path))
     out, err = done.communicate(timeout=300)
+    assert done.returncode == 0, out[-3000:] + err
     assert "Traceback" not in err
     assert re.search(r"floor: laser tcp 127\.0\.0\.1:\d+; tms agent floor --config", out)
     assert out.count("Tea bottle") == 7
     assert "Every pie is as in the paper, within 0.02." in out
-    assert done.returncode == 0, out + err
     assert_stopped(out)
 
 
