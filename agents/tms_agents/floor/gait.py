@@ -27,7 +27,8 @@ _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 _PACE_MEMORY, _PACE_LIFE = 12, 80
 #: Whose name is less sure does not change what is known of the name.
 SURE = 0.6
-#: Where shoes are seen, at least this share of all feet that walk is as wide as one (of legs it is 0.03 at most).
+#: Where shoes are seen, at least this share of all feet that walk is as wide as one (of legs it is 0.03 at most). Of
+#: somebody alone (`shoe`) it is unlearned while he seems to stand on a narrow thing.
 SHOD = 0.2
 NOTHING = (0.0, 0.0, np.inf, 0.0, 0.0, np.inf)
 
