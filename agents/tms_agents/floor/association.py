@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
-from tms_agents.floor.freespace import FREE, clear
+from tms_agents.floor.freespace import FREE, HIDDEN, clear
+from tms_agents.floor.gait import SHOES
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
@@ -26,6 +27,9 @@ _CHILDREN = 48
 _NEAR_M, _ALIKE = 0.08, 0.3
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
+#: And of missing one foot of somebody who walks (m/s) for so long (s): a leg that is all the time in the plane of the
+#: laser, a shoe only while it stands.
+_LIMP, _WALKS, _LEG_UP_S, _SHOE_UP_S = 0.8, 0.4, 0.15, 0.9
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
 #: What belongs to a name, not to the body that has it.
@@ -186,7 +190,7 @@ def _same(one: Any, two: Any, of: NDArray[np.int64]) -> bool:
 
 @njit(cache=True)
 def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
-    """Negative log likelihood of not having seen those of the movers ``rows`` (k,) that were in clear view."""
+    """Negative log likelihood of not having seen those of the movers ``rows`` (k,) that were in clear view, or a leg."""
     ranges, states, longest, pose, first, step = sight
     total = 0.0
     for b in rows:
@@ -194,7 +198,20 @@ def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float
         waits = body.seen < t and not body.stale and t - body.seen < 1.0
         if waits and clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
             total += _MISS
+        elif body.seen == t and _limps(body, t):
+            x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
+            x, y = 2.0 * body.x - x, 2.0 * body.y - y
+            if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
+                total += _LIMP
     return total
+
+
+@njit(cache=True)
+def _limps(body: Any, t: float) -> bool:
+    """Whether somebody walks and one foot is not seen for longer than it swings (a shoe is not seen then)."""
+    if body.robot or body.wide > 0.3 or np.hypot(body.vx, body.vy) < _WALKS:
+        return False
+    return bool(t - min(body.a_seen, body.b_seen) > (_SHOE_UP_S if body.shoe >= SHOES else _LEG_UP_S))
 
 
 @njit(cache=True)

@@ -101,7 +101,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
     body.lone_x, body.lone_y = c.x, c.y
     body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
-    body.shoe, body.leg, body.odd = 0.0, 0.0, 0
+    body.shoe, body.leg, body.odd, body.mute = 0.0, 0.0, 0, 0.0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure = 0.0, 0, 1.0

@@ -40,8 +40,8 @@ _WAITS_S, _STOPS_S = 25.0, 8.0
 _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
-#: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
-_FORMAT = 5
+#: Of saved states; 6: whether nothing echoed where a body began.
+_FORMAT = 6
 
 
 class FloorEstimator:
@@ -58,7 +58,7 @@ class FloorEstimator:
             name: View(index, sensor, self._settings, tuple(self._scene.mirrors))
             for index, (name, sensor) in enumerate(sensors.items())
         }
-        self._masks = Masks(self._scene.region, self._scene.masks)
+        self._masks = Masks(self._scene.region, self._scene.masks, self._scene.gates)
         self._gates = Area(self._scene.gates)
         self._prints = empty(PRINT, _PRINTS)
         self._association = Association(_BODIES)
@@ -157,6 +157,7 @@ class FloorEstimator:
             self._new_label,
             lambda body: self._furniture.was(body, self._pieces(t)),
             learned=view.background.learned,
+            reach_m=view.sensor.sweep.range_max_m,
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:

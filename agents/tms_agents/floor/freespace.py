@@ -255,7 +255,7 @@ def silent(
     low, high = max(0, int(np.ceil(middle - reach - 0.5))), min(ranges.size - 1, int(middle + reach + 0.5))
     count = 0
     for i in range(low, high + 1):
-        if np.isinf(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
+        if not np.isfinite(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
             count += 1
     return bool(count > 0 and 2 * count >= high - low + 1)
 

@@ -24,6 +24,8 @@ _FRESH_S = 1.0
 _BROAD_M = 0.45
 #: What is seen of a robot is so near its edge (m), if it was seen so long ago (s) at most.
 _BESIDE_M, _STAYS_S = 0.2, 2.0
+#: From its narrow side it looks at least this share as wide as from corner to corner.
+_NARROWEST = 0.4
 #: Negative log likelihood: of a foot seen just now being somewhere else, of having landed where something stood
 #: before, of swinging while the other foot swings.
 _SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
@@ -149,7 +151,9 @@ def costs(
                 if away > (0.5 * body.far + _BESIDE_M if jumps else _ROBOT_M):
                     continue
                 # Part of it may be hidden, but what is narrow and all in view is somebody's foot.
-                cost[i, 2 * column] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > 0.6 * body.width else 6.0)
+                # What is left of it at the edge of a door is no measure.
+                least = max(0.6 * body.width, _NARROWEST * body.far if body.machine else 0.0)
+                cost[i, 2 * column] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > least else 6.0)
                 continue
             lately = of[i] >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
             speed = np.hypot(body.vx, body.vy)

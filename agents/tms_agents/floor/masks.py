@@ -46,17 +46,32 @@ def distance(polygon: Array, x: float, y: float) -> float:
 
 
 @njit(cache=True)
-def _wanted(clusters: Any, region: Array, masks: Array, sizes: NDArray[np.int64], margin: float) -> int:
+def _among(corners: Array, sizes: NDArray[np.int64], x: float, y: float) -> bool:
+    """Whether (x, y) is in one of the polygons of so many ``corners`` each."""
+    start = 0
+    for m in range(sizes.size):
+        if inside(corners[start : start + sizes[m]], x, y):
+            return True
+        start += sizes[m]
+    return False
+
+
+@njit(cache=True)
+def _wanted(
+    clusters: Any,
+    region: Array,
+    margin: float,
+    gates: Array,
+    gate_sizes: NDArray[np.int64],
+    masks: Array,
+    mask_sizes: NDArray[np.int64],
+) -> int:
     """Move the clusters (m,) that count to the front; how many there are."""
     kept = 0
     for k in range(clusters.size):
         c = clusters[k]
-        good = region.shape[0] == 0 or distance(region, c.x, c.y) <= margin
-        start = 0
-        for m in range(sizes.size):
-            if good and inside(masks[start : start + sizes[m]], c.x, c.y):
-                good = False
-            start += sizes[m]
+        good = region.shape[0] == 0 or distance(region, c.x, c.y) <= margin or _among(gates, gate_sizes, c.x, c.y)
+        good = good and not _among(masks, mask_sizes, c.x, c.y)
         if good:
             if kept != k:
                 clusters[kept] = c
@@ -81,18 +96,24 @@ class Masks:
     #: What is a little outside (m) still counts: a foot on the threshold.
     MARGIN_M = 0.15
 
-    def __init__(self, region: Polygon | None, masks: Sequence[Polygon]) -> None:
+    def __init__(self, region: Polygon | None, masks: Sequence[Polygon], gates: Sequence[Polygon] = ()) -> None:
         self._region = np.zeros((0, 2)) if region is None else np.asarray(region, dtype=float)
-        self._masks = np.concatenate([np.asarray(m, dtype=float) for m in masks]) if masks else np.zeros((0, 2))
-        self._sizes = np.array([len(m) for m in masks], dtype=np.int64)
+        # Who comes in is met in the door.
+        self._gates, self._masks = _joined(gates), _joined(masks)
         self._any = region is not None or bool(masks)
 
     def __call__(self, clusters: Any) -> Any:
-        """The clusters (m,) in the region and in no mask; they are moved to the front of the array."""
+        """The clusters (m,) in the region or a gate and in no mask; they are moved to the front of the array."""
         if not self._any:
             return clusters
-        return clusters[: _wanted(clusters, self._region, self._masks, self._sizes, self.MARGIN_M)]
+        return clusters[: _wanted(clusters, self._region, self.MARGIN_M, *self._gates, *self._masks)]
 
     def outside(self, x: float, y: float) -> bool:
         """Whether (x, y) is not in the region: nothing lies there that concerns anybody."""
         return self._region.size > 0 and not inside(self._region, x, y)
+
+
+def _joined(polygons: Sequence[Polygon]) -> tuple[Array, NDArray[np.int64]]:
+    """Their corners (n, 2), one after the other, and how many each has."""
+    corners = np.concatenate([np.asarray(polygon, dtype=float) for polygon in polygons]) if polygons else np.zeros((0, 2))
+    return corners, np.array([len(polygon) for polygon in polygons], dtype=np.int64)

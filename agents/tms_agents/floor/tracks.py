@@ -36,6 +36,10 @@ _FOOT_S = 1.5
 _RESTS_S = 2.0
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
+#: Who has gone out of the room and is not seen for so long (s) has left.
+_THROUGH_S = 0.4
+#: A door is so near (m); who is out of reach of the laser goes on for so long (s).
+_DOOR_M, _AHEAD_S = 0.3, 2.0
 #: A foot that leaves lands so far away (m) within so long (s).
 _STRIDE_M, _STEPS_S = 1.2, 0.6
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
@@ -56,6 +60,7 @@ class Tracks:
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._actions = np.zeros(self.bodies.size, np.int64)
+        self._reach = (0.0, 0.0, math.inf)
 
     def review(
         self,
@@ -66,12 +71,15 @@ class Tracks:
         was_furniture: Callable[[Any], bool],
         *,
         learned: bool,
+        reach_m: float,
     ) -> list[FloorEvent]:
         """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes.
 
+        ``reach_m``: so far the sensor sees.
         ``was_furniture`` tells of a body whether a piece of background has gone from where it began.
         """
         s = self._settings
+        self._reach = (float(sight[3][0]), float(sight[3][1]), reach_m)
         judge: Any = review
         judge(
             self.bodies,
@@ -86,7 +94,9 @@ class Tracks:
             self._actions,
             bool(self._region.polygons),
             learned,
+            reach_m,
         )
+        self._see_off(t)
         self._believe_steps(t)
         self._association.rename(t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t)
@@ -162,6 +172,15 @@ class Tracks:
             return [] if body["stale"] else [Stale(t, int(body["label"]))]
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
 
+    def _see_off(self, t: float) -> None:
+        """Who has gone on out of the room while nobody saw him has left."""
+        bodies = self.bodies
+        unseen = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == 0)
+        for index in np.flatnonzero(unseen & (bodies["seen"] < t - _THROUGH_S)).tolist():
+            body = bodies[index]
+            if self._through(body) and body["seen"] - body["rest_at"] < _RESTS_S:
+                self._actions[index] = GONE
+
     def _unite(self, t: float) -> list[FloorEvent]:
         """Two movers with one foot each at one place are one: the younger label goes."""
         bodies = self.bodies
@@ -187,7 +206,7 @@ class Tracks:
             # Who has sat down has not gone on the way he went.
             foot = "a" if body["a_seen"] > body["b_seen"] else "b"
             body["x"], body["y"] = body[f"{foot}x"], body[f"{foot}y"]
-        elif self._outside(body) and body["seen"] - body["rest_at"] < _RESTS_S:
+        elif body["seen"] - body["rest_at"] < _RESTS_S and self._leaves(body):
             self._association.forget(index)
             return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
         if body["seen"] == t:
@@ -213,10 +232,20 @@ class Tracks:
         feet = [foot for foot in "ab" if body["seen"] - body[f"{foot}_seen"] < _FOOT_S]
         return min((area.distance(body[f"{foot}x"], body[f"{foot}y"]) for foot in feet), default=math.inf)
 
-    def _outside(self, body: Any) -> bool:
+    def _leaves(self, body: Any) -> bool:
+        """Whether the body is in a door or past it, or is on the way there where the sensor does not reach."""
+        if self._through(body) or self._gates.distance(float(body["x"]), float(body["y"])) < _DOOR_M:
+            return True
+        laser_x, laser_y, reach_m = self._reach
+        if math.hypot(body["x"] - laser_x, body["y"] - laser_y) < reach_m:
+            return False
+        ways = (_AHEAD_S * k / 4 for k in range(1, 5))
+        ahead = [(float(body["x"] + s * body["vx"]), float(body["y"] + s * body["vy"])) for s in ways]
+        return any(self._gates.distance(*xy) < _DOOR_M for xy in ahead)
+
+    def _through(self, body: Any) -> bool:
+        """Whether the body has gone on out of the room."""
         x, y = float(body["x"]), float(body["y"])
-        if self._gates.polygons:
-            return self._gates.distance(x, y) < 0.3
         return bool(self._region.polygons) and self._region.distance(x, y) > 0.0
 
     def _confirm(

@@ -14,6 +14,7 @@ from tms_agents.simulation.floor_world.shapes import BLACK, Material, Pose, Xy
 from tms_agents.simulation.floor_world.standing import standing
 from tms_agents.simulation.floor_world.stories import cross, leave, new_thing, pick, push, put, sit, wander
 from tms_agents.simulation.floor_world.tasks import Drag, Face, Go, Story, Wait
+from tms_agents.simulation.floor_world.visits import visits
 
 #: Nobody is in the room before, so that a background can be learnt.
 QUIET_S = 8.0
@@ -331,6 +332,10 @@ SCENARIOS: dict[str, Scenario] = {
     "standing": Scenario(
         description="people stand for minutes, things beside them", duration=420,
         write=lambda life, duration: standing(life, duration, QUIET_S),
+    ),
+    "visits": Scenario(
+        description="visitors of seconds, one after the other", duration=180,
+        write=lambda life, duration: visits(life, duration, QUIET_S, ROBOT_SIZE),
     ),
     "furniture": Scenario(description="furniture is moved, a door swings", duration=200, write=_furniture),
     "robots": Scenario(description="robots among people", duration=170, write=_robots),
