@@ -157,7 +157,6 @@ class FloorEstimator:
             self._new_label,
             lambda body: self._furniture.was(body, self._pieces(t)),
             learned=view.background.learned,
-            reach_m=view.sensor.sweep.range_max_m,
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:

@@ -50,7 +50,7 @@ _STEPS, _BOTH = 3, 30
 #: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
 _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
 #: Where nothing echoes for this share of the time nothing has gone away: something dark flickers, now here, now there.
-_MUTE = 0.3
+_MUTE = 0.5
 #: What somebody has put down is so near him (m), also when he has gone on for a moment.
 _PUT_M, _PUT_S = 1.2, 3.0
 #: A mover is told again when it has moved so far (m).
@@ -157,12 +157,8 @@ def review(
     actions: NDArray[np.int64],
     inside: bool,
     learned: bool,
-    reach: float,
 ) -> None:
-    """What is due for each body, into ``actions``; drops tentative ones that came to nothing.
-
-    ``inside``: the walls are known; ``reach`` m of the sensor.
-    """
+    """What is due for each body, into ``actions``; drops tentative ones that came to nothing."""
     for b in range(bodies.size):
         body = bodies[b]
         actions[b] = NOTHING
@@ -247,12 +243,9 @@ def review(
             if view == FREE:
                 body.clear += dt
             elif view == UNSEEN or (view == WALLED and not inside):
-                if not inside:
-                    # Who walks on out of sight is soon far.
-                    walks = np.hypot(body.x - body.told_x, body.y - body.told_y) > _REST_M
-                    body.clear += dt if walks else 0.5 * dt
-                elif np.hypot(body.x - pose[0], body.y - pose[1]) < reach:
-                    body.clear += 0.5 * dt
+                # Where no walls are known, who walks on out of sight is soon far.
+                walks = not inside and np.hypot(body.x - body.told_x, body.y - body.told_y) > _REST_M
+                body.clear += dt if walks else 0.5 * dt
             elif view == HIDDEN:
                 body.clear = max(0.0, body.clear - 0.5 * dt)
         if body.clear > leave_s or unseen > hidden_s:

@@ -38,8 +38,8 @@ _RESTS_S = 2.0
 _OUT_M, _SPEED = 0.5, 0.9
 #: Who has gone out of the room and is not seen for so long (s) has left.
 _THROUGH_S = 0.4
-#: A door is so near (m); who is out of reach of the laser goes on for so long (s).
-_DOOR_M, _AHEAD_S = 0.3, 2.0
+#: Who is so near (m) is in a door.
+_DOOR_M = 0.3
 #: A foot that leaves lands so far away (m) within so long (s).
 _STRIDE_M, _STEPS_S = 1.2, 0.6
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
@@ -60,7 +60,6 @@ class Tracks:
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._actions = np.zeros(self.bodies.size, np.int64)
-        self._reach = (0.0, 0.0, math.inf)
 
     def review(
         self,
@@ -71,15 +70,12 @@ class Tracks:
         was_furniture: Callable[[Any], bool],
         *,
         learned: bool,
-        reach_m: float,
     ) -> list[FloorEvent]:
         """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes.
 
-        ``reach_m``: so far the sensor sees.
         ``was_furniture`` tells of a body whether a piece of background has gone from where it began.
         """
         s = self._settings
-        self._reach = (float(sight[3][0]), float(sight[3][1]), reach_m)
         judge: Any = review
         judge(
             self.bodies,
@@ -94,7 +90,6 @@ class Tracks:
             self._actions,
             bool(self._region.polygons),
             learned,
-            reach_m,
         )
         self._see_off(t)
         self._believe_steps(t)
@@ -233,15 +228,8 @@ class Tracks:
         return min((area.distance(body[f"{foot}x"], body[f"{foot}y"]) for foot in feet), default=math.inf)
 
     def _leaves(self, body: Any) -> bool:
-        """Whether the body is in a door or past it, or is on the way there where the sensor does not reach."""
-        if self._through(body) or self._gates.distance(float(body["x"]), float(body["y"])) < _DOOR_M:
-            return True
-        laser_x, laser_y, reach_m = self._reach
-        if math.hypot(body["x"] - laser_x, body["y"] - laser_y) < reach_m:
-            return False
-        ways = (_AHEAD_S * k / 4 for k in range(1, 5))
-        ahead = [(float(body["x"] + s * body["vx"]), float(body["y"] + s * body["vy"])) for s in ways]
-        return any(self._gates.distance(*xy) < _DOOR_M for xy in ahead)
+        """Whether the body is in a door or past it."""
+        return self._through(body) or self._gates.distance(float(body["x"]), float(body["y"])) < _DOOR_M
 
     def _through(self, body: Any) -> bool:
         """Whether the body has gone on out of the room."""

@@ -97,7 +97,7 @@ def found(bodies: np.ndarray, seconds: float, view: tuple = OPEN) -> list[int]:
     said = []
     for k in range(round(10 * seconds)):
         bodies["seen"] = bodies["a_seen"] = t = NOW + 0.1 * k
-        review(bodies, t, 0.1, *view, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, 10.0)
+        review(bodies, t, 0.1, *view, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
         said.append(int(actions[0]))
     return said
 

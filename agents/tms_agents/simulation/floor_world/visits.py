@@ -21,7 +21,7 @@ def visits(life: Life, duration: float, quiet_s: float, robot: tuple[float, floa
         errand = me.rng.random()
         if errand < 0.4 and len(lying) < 6:
             size = float(me.rng.choice(_SIZES))
-            yield from put(life, me, new_thing(life, size, f"o{len(life.stays) + 1}"))
+            yield from put(life, me, new_thing(life, size, f"o{me.id[1:]}"))
         elif errand < 0.7 and lying:
             yield from pick(life, me, lying[me.rng.integers(len(lying))])
         else:
