@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.freespace import FREE, HIDDEN, clear
-from tms_agents.floor.gait import SHOES
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
 from tms_agents.floor.segmentation import CLUSTER
@@ -27,9 +26,8 @@ _CHILDREN = 48
 _NEAR_M, _ALIKE = 0.08, 0.3
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
-#: And of missing one foot of somebody who walks (m/s) for so long (s): a leg that is all the time in the plane of the
-#: laser, a shoe only while it stands.
-_LIMP, _WALKS, _LEG_UP_S, _SHOE_UP_S = 0.8, 0.4, 0.15, 0.9
+#: And of missing one leg of somebody who walks (m/s) for so long (s), seen so often, in this share on both legs.
+_LIMP, _WALKS, _UP_S, _SEEN, _MOSTLY = 0.8, 0.4, 0.6, 20, 0.6
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
 #: What belongs to a name, not to the body that has it.
@@ -208,10 +206,10 @@ def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float
 
 @njit(cache=True)
 def _limps(body: Any, t: float) -> bool:
-    """Whether somebody walks and one foot is not seen for longer than it swings (a shoe is not seen then)."""
+    """Whether somebody walks of whom both legs are seen mostly (a shoe is up half of the time), and now one is not."""
     if body.robot or body.wide > 0.3 or np.hypot(body.vx, body.vy) < _WALKS:
         return False
-    return bool(t - min(body.a_seen, body.b_seen) > (_SHOE_UP_S if body.shoe >= SHOES else _LEG_UP_S))
+    return bool(body.hits > _SEEN and body.both > _MOSTLY * body.hits and t - min(body.a_seen, body.b_seen) > _UP_S)
 
 
 @njit(cache=True)

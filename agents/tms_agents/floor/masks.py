@@ -70,7 +70,8 @@ def _wanted(
     kept = 0
     for k in range(clusters.size):
         c = clusters[k]
-        good = region.shape[0] == 0 or distance(region, c.x, c.y) <= margin or _among(gates, gate_sizes, c.x, c.y)
+        outside = 0.0 if region.shape[0] == 0 else distance(region, c.x, c.y)
+        good = outside <= margin or (outside <= 2.0 * margin and _among(gates, gate_sizes, c.x, c.y))
         good = good and not _among(masks, mask_sizes, c.x, c.y)
         if good:
             if kept != k:
