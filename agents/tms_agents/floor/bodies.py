@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from tms_agents.floor.gait import foot, middle, shod, swap
+from tms_agents.floor.segmentation import FADES
 
 #: Acceleration noise (m²/s³) and how fast the memory of a velocity fades while nothing is seen (s).
 _ACCELERATION, _COAST_S = 1.5, 2.0
@@ -53,7 +54,7 @@ def predict(bodies: Any, t: float) -> None:
 @njit(cache=True)
 def narrow(c: Any) -> bool:
     """Whether the cluster, all of it in view, is too narrow for an ankle or a shoe: the leg of a chair, say."""
-    if c.n == 1 and c.spacing < 0.035:
+    if c.n == 1 and c.spacing < 0.035 and c.cut != FADES:
         return True
     return bool(c.width + 0.5 * c.spacing < (0.6 if c.cut else 1.0) * _FOOT_M)
 
@@ -101,7 +102,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
     body.lone_x, body.lone_y = c.x, c.y
     body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
-    body.shoe, body.leg, body.odd, body.mute = 0.0, 0.0, 0, 0.0
+    body.shoe, body.leg, body.odd = 0.0, 0.0, 0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure = 0.0, 0, 1.0

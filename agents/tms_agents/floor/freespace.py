@@ -13,6 +13,8 @@ from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 
+#: What stands at a place is met within this (m) before or behind it.
+_DEEP_M = 0.1
 #: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
 #: Half hidden, and seen past where the rest of it was met.
 UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT, PAST = 0, 1, 2, 3, 4, 5, 6
@@ -258,6 +260,25 @@ def silent(
         if not np.isfinite(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
             count += 1
     return bool(count > 0 and 2 * count >= high - low + 1)
+
+
+@njit(cache=True)
+def vacant(
+    x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent."""
+    away = np.hypot(x - pose[0], y - pose[1])
+    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, ranges.size)
+    if np.isnan(middle):
+        return True
+    reach = np.arctan(half / max(away, 0.05)) / abs(step)
+    passes, total = 0, 0
+    for i in range(max(0, int(middle - reach)), min(ranges.size - 1, int(middle + reach + 1)) + 1):
+        total += 1
+        known = np.isfinite(ranges[i])
+        if (known and abs(ranges[i] - away) > _DEEP_M) or (not known and not np.isfinite(longest[i])):
+            passes += 1
+    return bool(2 * passes >= total)
 
 
 @njit(cache=True)

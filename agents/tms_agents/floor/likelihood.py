@@ -139,7 +139,7 @@ def costs(
                 continue
             if of[i] >= 0 and lay_before(q, body):
                 continue
-            if not body.confirmed and age > t - body.first + 0.25:
+            if not body.confirmed and of[i] >= 0 and q.rested < body.first - 0.25:
                 continue
             if not body.confirmed and _strides(body, c) > LONGEST_M:
                 continue

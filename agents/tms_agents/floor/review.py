@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
-from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, silent
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
 from tms_agents.floor.gait import SHOES
 from tms_agents.floor.prints import ALONE
 
@@ -49,8 +49,10 @@ _KNOWN = 200
 _STEPS, _BOTH = 3, 30
 #: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
 _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
-#: Where nothing echoes for this share of the time nothing has gone away: something dark flickers, now here, now there.
-_MUTE = 0.5
+#: Who walks is believed after so long (s), or never.
+_UNSURE_S = 6.0
+#: Where somebody began looks free, or he still stands there, within this (m).
+_BEGAN_M, _STILL_THERE_M = 0.03, 0.12
 #: What somebody has put down is so near him (m), also when he has gone on for a moment.
 _PUT_M, _PUT_S = 1.2, 3.0
 #: A mover is told again when it has moved so far (m).
@@ -96,6 +98,15 @@ def _is_put(bodies: Any, b: int, t: float) -> bool:
         if person and np.hypot(other.x - body.x0, other.y - body.y0) < _PUT_M:
             return True
     return False
+
+
+@njit(cache=True)
+def _has_come(body: Any, t: float, ranges: Array, longest: Array, pose: Array, first: float, step: float) -> bool:
+    """Whether it has gone from where it began: of something dark that stands there parts flicker, here and there."""
+    a = body.a_seen == t and np.hypot(body.ax - body.x0, body.ay - body.y0) < _STILL_THERE_M
+    if a or (body.b_seen == t and np.hypot(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
+        return True
+    return bool(vacant(body.x0, body.y0, _BEGAN_M, ranges, longest, pose, first, step))
 
 
 @njit(cache=True)
@@ -173,18 +184,18 @@ def review(
             way = np.hypot(body.x - body.x0, body.y - body.y0)
             age = body.seen - body.first
             parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
-            if unseen > 0.45 or (age > 3.0 and way < 0.15) or parked or body.hits < 0.5 * body.looks - 1.0:
+            stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
+            if unseen > 0.45 or stays or parked or body.hits < 0.5 * body.looks - 1.0:
                 body.used = 0
                 continue
-            if silent(body.x0, body.y0, _STEP_M, ranges, longest, pose, first, step):
-                body.mute += dt
-            if unseen > 0.0 or body.mute > _MUTE * age:
+            if unseen > 0.0:
                 continue
             beside, halved, part = np.inf, False, False
             for o in range(bodies.size):
                 if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
                     away = np.hypot(bodies[o].x - body.x, bodies[o].y - body.y)
-                    beside = min(beside, away)
+                    # Who begins beside somebody may be he, and what stands there what he has put down.
+                    beside = min(beside, away, np.hypot(bodies[o].x - body.x0, bodies[o].y - body.y0))
                     # A part of somebody who is wide: legs that are one thing to the laser fall apart now and then.
                     part = part or away < 0.12 + 0.5 * bodies[o].width
                     # One foot of somebody there is not seen now: this may be it.
@@ -203,7 +214,8 @@ def review(
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
             if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= max(3.0, 0.45 * body.hits):
-                actions[b] = NOTHING if _is_put(bodies, b, t) else CONFIRM
+                came = _has_come(body, t, ranges, longest, pose, first, step)
+                actions[b] = CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
             continue
         if unseen == 0.0:
             only_a = body.a_seen >= body.b_seen

@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 #: A cluster in the room frame: (x, y) m of the middle of the thing, (width m) across the beams, (n) beams, (near) its
 #: range, (first, last) beam, (cut) partly hidden behind something nearer, 2: that is new, (attached) its surface goes
 #: on as background: a piece of furniture or wall, (gap) m to the background behind it, (mirror) seen in a mirror (-1:
-#: directly).
+#: directly). Of what is dark not every beam comes back: cut `FADES` beside beams that bring nothing.
+FADES = 3
 CLUSTER = np.dtype(
     [
         ("x", "f8"),
@@ -155,8 +156,8 @@ def _segment(
             if 0 <= side < n and ranges[side] < c.near - 0.1 and not np.isnan(ranges[side]):
                 c.cut = max(c.cut, 1 if states[side] == BACKGROUND else 2)
         for side in (a - 1, b + 1):
-            if 0 <= side < n and np.isinf(ranges[side]) and np.isfinite(longest[side]):
-                c.cut = max(c.cut, 1)
+            if 0 <= side < n and not np.isfinite(ranges[side]) and np.isfinite(longest[side]) and not c.cut:
+                c.cut = FADES
         middle = (a + b) // 2
         c.gap = longest[middle] - ranges[middle]
         shift = _DEPTH * min(c.width, 0.5)

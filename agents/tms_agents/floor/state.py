@@ -61,7 +61,7 @@ PRINT = np.dtype(
 #: who it is (look, pace), and of the one whose name it has (own, own_pace); sure is how likely that name is. Further:
 #: for how long (s) and where it has stood on one foot alone (lone), for how long what it stands on had been nobody's
 #: before (older, s), where and since when it has stayed (rest), how wide the legs are (m, 0: unknown), whether what is
-#: seen of it is no foot, and why (odd, `prints.UNLIKE`), and for how long (s) nothing echoed where it began (mute).
+#: seen of it is no foot, and why (odd, `prints.UNLIKE`).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -138,7 +138,6 @@ BODY = np.dtype(
         ("shoe", "f8"),
         ("leg", "f8"),
         ("odd", "i8"),
-        ("mute", "f8"),
         ("shine", "f8"),
         ("shine_n", "i8"),
         ("own", "f8"),
