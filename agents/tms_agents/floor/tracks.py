@@ -38,8 +38,8 @@ _RESTS_S = 2.0
 _OUT_M, _SPEED = 0.5, 0.9
 #: Who has gone out of the room and is not seen for so long (s) has left.
 _THROUGH_S = 0.6
-#: Who is so near (m) is in a door, or has gone out of one.
-_DOOR_M, _BEYOND_M = 0.3, 0.8
+#: Who is so near (m) is in a door. Of a way out of the room so many places are looked at.
+_DOOR_M, _SAMPLES = 0.3, 9
 #: A foot that leaves lands so far away (m) within so long (s).
 _STRIDE_M, _STEPS_S = 1.2, 0.6
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
@@ -232,11 +232,13 @@ class Tracks:
         return self._through(body) or self._gates.distance(float(body["x"]), float(body["y"])) < _DOOR_M
 
     def _through(self, body: Any) -> bool:
-        """Whether the body has gone on out of the room, and not through a wall."""
-        x, y = float(body["x"]), float(body["y"])
+        """Whether the body has gone on out of the room since it was told last: by a door, not through a wall."""
+        x, y, dx, dy = (float(body[name]) for name in ("x", "y", "told_x", "told_y"))
         if not self._region.polygons or self._region.distance(x, y) == 0.0:
             return False
-        return not self._gates.polygons or self._gates.distance(x, y) < _BEYOND_M
+        ways = ((dx + u * (x - dx), dy + u * (y - dy)) for u in np.linspace(0.0, 1.0, _SAMPLES))
+        out = next((xy for xy in ways if self._region.distance(*xy) > 0.0), (x, y))
+        return not self._gates.polygons or self._gates.distance(*out) < _DOOR_M
 
     def _confirm(
         self, index: int, t: float, new_label: Callable[[], int], was_furniture: Callable[[Any], bool]
