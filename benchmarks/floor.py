@@ -2,12 +2,13 @@
 
     python benchmarks/floor.py                     all tables (half an hour on one core)
     python benchmarks/floor.py --quick             the same with two seeds of each kind and a short hour
-    python benchmarks/floor.py --only movers       or objects, static, samples, speed, memory
+    python benchmarks/floor.py --only movers       or objects, plain, static, samples, speed, memory
     python benchmarks/floor.py --seeds unseen      or tuning; both by default
     python benchmarks/floor.py --first 1070        other unseen seeds: five from there on
     python benchmarks/floor.py --look "three" --seed 3 --feet prints     one world in numbers
 
-Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz. Seeds below 1000 were there to tune on,
+Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz; `plain`: of 683 beams that reach 5.6 m
+and do not tell how brightly they echo, which is what the shared samples are. Seeds below 1000 were there to tune on,
 those from 1000 on were not. Stone Soup, which is compared for speed, is no dependency: `pip install stonesoup`.
 """
 
@@ -30,7 +31,7 @@ from floor_speed import speed
 from floor_tables import movers_table, objects_table, requirements_table, static_table
 
 from tms_agents.devices.scans import Sweep
-from tms_agents.simulation.floor_world import UNSEEN, FloorWorld
+from tms_agents.simulation.floor_world import LASERS, UNSEEN, FloorWorld
 
 Feet = Literal["legs", "prints"]
 
@@ -43,6 +44,7 @@ OBJECT_SCENES = (
     *("things", "near wall", "glossy", "hidden", "standing", "furniture"),
     *("robots", "two lasers", "mirror", "misplaced"),
 )
+PLAIN_SCENES = ("one", "three", "three close", "visits", "bed", "robots", "things", "furniture")
 SCENES = tuple(dict.fromkeys(MOVER_SCENES + OBJECT_SCENES))
 FEET: tuple[Feet, ...] = ("legs", "prints")
 SAMPLES = Path(os.environ.get("TMS_SHARED_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
@@ -55,6 +57,7 @@ class Job:
     seed: int
     contestant: str
     duration: float | None = None
+    plain: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,7 @@ class Outcome:
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer seeds")
-    parser.add_argument("--only", choices=("movers", "objects", "static", "samples", "speed", "memory"))
+    parser.add_argument("--only", choices=("movers", "objects", "plain", "static", "samples", "speed", "memory"))
     parser.add_argument("--seeds", choices=("tuning", "unseen", "both"), default="both")
     parser.add_argument("--first", type=int, default=UNSEEN, help="first of the unseen seeds")
     parser.add_argument("--contestants", default="ours,laboratory", help="comma separated")
@@ -95,6 +98,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if args.only in (None, "movers", "objects"):
             scenes = {"movers": MOVER_SCENES, "objects": OBJECT_SCENES}.get(args.only or "", SCENES)
             worlds(pool, scenes, seeds, names)
+        if args.only in (None, "plain"):
+            print("# A coarse laser without brightness\n")
+            worlds(pool, PLAIN_SCENES, seeds, names, plain=True)
         if args.only in (None, "static"):
             static(pool, seeds, names, 3600 * (args.hours or (0.2 if args.quick else 1.0)))
     if args.only in (None, "samples"):
@@ -108,10 +114,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
 # worlds
 
 
-def worlds(pool: ProcessPoolExecutor, scenes: Sequence[str], seeds: dict[str, range], names: Sequence[str]) -> None:
-    """Every scene with every kind of feet."""
+def worlds(
+    pool: ProcessPoolExecutor,
+    scenes: Sequence[str],
+    seeds: dict[str, range],
+    names: Sequence[str],
+    *,
+    plain: bool = False,
+) -> None:
+    """Every scene with every kind of feet; ``plain``: seen by a coarse laser that tells no brightness."""
     jobs = [
-        Job(scene, feet, seed, name)
+        Job(scene, feet, seed, name, plain=plain)
         for scene in scenes
         for feet in FEET
         for kind in seeds.values()
@@ -121,13 +134,13 @@ def worlds(pool: ProcessPoolExecutor, scenes: Sequence[str], seeds: dict[str, ra
     done = dict(zip(jobs, pool.map(judged, jobs), strict=True))
 
     def of(scene: str, feet: str, kind: str, name: str) -> list[Scores]:
-        return [done[Job(scene, _feet(feet), seed, name)].scores for seed in seeds[kind]]
+        return [done[Job(scene, _feet(feet), seed, name, plain=plain)].scores for seed in seeds[kind]]
 
     for kind, numbers in seeds.items():
         print(f"## Seeds {numbers[0]} to {numbers[-1]} ({kind}); mean and standard deviation over the seeds\n")
-        if moving := [scene for scene in scenes if scene in MOVER_SCENES]:
+        if moving := [scene for scene in scenes if plain or scene in MOVER_SCENES]:
             print(movers_table({(s, f, n): of(s, f, kind, n) for s in moving for f in FEET for n in names}), end="\n\n")
-        if lying := [scene for scene in scenes if scene in OBJECT_SCENES]:
+        if lying := [scene for scene in scenes if plain or scene in OBJECT_SCENES]:
             print(objects_table({(s, f, n): of(s, f, kind, n) for s in lying for f in FEET for n in names}), end="\n\n")
     if "ours" in names:
         ours: dict[tuple[str, str, str], list[Scores]] = {
@@ -138,10 +151,11 @@ def worlds(pool: ProcessPoolExecutor, scenes: Sequence[str], seeds: dict[str, ra
 
 def judged(job: Job) -> Outcome:
     """Play one world to one contestant."""
-    world = FloorWorld(job.scene, job.seed, feet="legs" if job.feet == "legs" else "prints", duration=job.duration)
+    laser = LASERS["coarse" if job.plain else "fine"]
+    world = FloorWorld(job.scene, job.seed, feet=job.feet, laser=laser, duration=job.duration)
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
     contestant = CONTESTANTS[job.contestant](sensors, world.known())
-    scans = ((f.sensor, f.t, f.ranges, f.intensities) for f in world.scans())
+    scans = ((f.sensor, f.t, f.ranges, None if job.plain else f.intensities) for f in world.scans())
     prediction, late_events = told(contestant, scans)
     late = {one["id"] for frame in prediction if frame["t"] > 30 for one in frame["labels"]}
     return Outcome(score(world.truth(), prediction), late_events, len(late))

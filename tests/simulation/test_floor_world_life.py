@@ -140,6 +140,16 @@ def test_things_near_a_wall_are_less_than_10_cm_before_it() -> None:
     assert sum(gap < 0.1 for gap in gaps) >= 5
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_visitors_stay_for_seconds_and_no_two_things_have_one_name(seed: int) -> None:
+    world, truth = truth_of("visits", seed)
+    stays = [m["t_leave"] - m["t_enter"] for m in truth["movers"] if m["kind"] == "person" and m["t_leave"]]
+    assert len(stays) >= 5
+    assert 5.0 < float(np.median(stays)) < 30.0
+    names = [stay.thing.id for stay in world.life.stays]
+    assert len(names) == len(set(names)) > 0
+
+
 def test_who_sits_on_the_bed_is_in_the_room_but_no_beam_meets_him() -> None:
     _, truth = truth_of("bed", 1, 130.0)
     sitter = truth["movers"][0]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
-from tms_agents.floor.freespace import FREE, HIDDEN, clear
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known
+from tms_agents.floor.missing import missed
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
@@ -24,10 +24,6 @@ _KEPT, _WORSE, _BRANCH = 12, 14.0, 7.0
 _CHILDREN = 48
 #: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
 _NEAR_M, _ALIKE = 0.08, 0.3
-#: Negative log likelihood of missing somebody in clear view in one scan.
-_MISS = 2.0
-#: And of missing one leg of somebody who walks (m/s) for so long (s), seen so often, in this share on both legs.
-_LIMP, _WALKS, _UP_S, _SEEN, _MOSTLY = 0.8, 0.4, 0.6, 20, 0.6
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
 #: What belongs to a name, not to the body that has it.
@@ -187,32 +183,6 @@ def _same(one: Any, two: Any, of: NDArray[np.int64]) -> bool:
 
 
 @njit(cache=True)
-def _missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
-    """Negative log likelihood of not having seen those of the movers ``rows`` (k,) that were in clear view, or a leg."""
-    ranges, states, longest, pose, first, step = sight
-    total = 0.0
-    for b in rows:
-        body = bodies[b]
-        waits = body.seen < t and not body.stale and t - body.seen < 1.0
-        if waits and clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
-            total += _MISS
-        elif body.seen == t and _limps(body, t):
-            x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
-            x, y = 2.0 * body.x - x, 2.0 * body.y - y
-            if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
-                total += _LIMP
-    return total
-
-
-@njit(cache=True)
-def _limps(body: Any, t: float) -> bool:
-    """Whether somebody walks of whom both legs are seen mostly (a shoe is up half of the time), and now one is not."""
-    if body.robot or body.wide > 0.3 or np.hypot(body.vx, body.vy) < _WALKS:
-        return False
-    return bool(body.hits > _SEEN and body.both > _MOSTLY * body.hits and t - min(body.a_seen, body.b_seen) > _UP_S)
-
-
-@njit(cache=True)
 def _copy(source: Any, source_belief: Array, target: Any, target_belief: Array) -> None:
     """Copy the bodies that are used, and who they may be."""
     for b in range(source.size):
@@ -304,9 +274,9 @@ def _advance(
         free = np.ones(m, np.bool_)
         _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t)
         _complete(bodies, clusters, of, marks, free, blank, prints, t)
-        missed = _missed(bodies, rows[:k], t, sight)
+        unseen = missed(bodies, rows[:k], t, sight)
         known_already = False
-        score = child_score[o] - least + missed
+        score = child_score[o] - least + unseen
         for j in range(kept):
             if _same(spare[j], bodies, other_of):
                 worse = score - scores[j]

@@ -116,5 +116,5 @@ class Masks:
 
 def _joined(polygons: Sequence[Polygon]) -> tuple[Array, NDArray[np.int64]]:
     """Their corners (n, 2), one after the other, and how many each has."""
-    corners = np.concatenate([np.asarray(polygon, dtype=float) for polygon in polygons]) if polygons else np.zeros((0, 2))
-    return corners, np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    corners = [np.zeros((0, 2)), *(np.asarray(polygon, dtype=float) for polygon in polygons)]
+    return np.concatenate(corners), np.array([len(polygon) for polygon in polygons], dtype=np.int64)

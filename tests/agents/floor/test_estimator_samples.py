@@ -61,6 +61,17 @@ def test_what_a_robot_and_a_foot_hide_is_kept(shared_data: Path, name: str) -> N
         assert (there[0].label in gone) == taken
 
 
+@pytest.mark.parametrize(
+    ("name", "there"), [("s1_floor", 2), ("s1_leg", 2), ("s3_floor", 3), ("s3_leg", 3), ("s6_leg", 2)]
+)
+def test_everybody_who_comes_is_one_label_and_a_cabinet_that_is_moved_is_nobody(
+    shared_data: Path, name: str, there: int
+) -> None:
+    events, _ = play(shared_data / f"floor/sim/{name}_A.npz")
+    assert len([event for event in events if isinstance(event, Appeared) and event.kind == "mover"]) == there
+    assert len([event for event in events if isinstance(event, Vanished)]) >= there
+
+
 @pytest.mark.parametrize(("name", "people"), [("tamu_people_1", 1), ("tamu_people_4", 1), ("tamu_people_5", 2)])
 def test_the_number_of_people_of_real_recordings(shared_data: Path, name: str, people: int) -> None:
     events, seen = play(shared_data / f"floor/real/{name}.npz")

@@ -74,7 +74,7 @@ def test_nobody_begins_by_a_step_that_is_too_long(away: float, may_step: bool) -
     bodies["used"], bodies["first"], bodies["seen"], bodies["a_seen"], bodies["pp"] = 1, NOW - 0.6, NOW - 0.3, NOW, 0.25
     bodies["a_print"] = bodies["b_print"] = -1
     bodies["b_seen"] = -1e9
-    prints["used"], prints["first"], prints["last"] = 1, NOW - 0.1, NOW
+    prints["used"], prints["first"], prints["rested"], prints["last"] = 1, NOW - 0.1, NOW - 0.1, NOW
     clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = away, 6, 0.1, 0.015
     cost = np.zeros((1, 3))
     one = np.zeros(1, np.int64)

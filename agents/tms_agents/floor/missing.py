@@ -1,0 +1,42 @@
+"""What it costs an explanation of a scan that somebody who is there was not seen, or one of his legs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.freespace import FREE, HIDDEN, clear
+
+#: Negative log likelihood of missing somebody in clear view in one scan.
+_MISS = 2.0
+#: And of missing one leg of somebody who walks (m/s) for so long (s), seen so often, in this share on both legs.
+_LIMP, _WALKS, _UP_S, _SEEN, _MOSTLY = 0.8, 0.4, 0.6, 20, 0.6
+
+
+@njit(cache=True)
+def missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
+    """Negative log likelihood of not having seen those movers ``rows`` (k,), or a leg of theirs, that were in view."""
+    ranges, states, longest, pose, first, step = sight
+    total = 0.0
+    for b in rows:
+        body = bodies[b]
+        waits = body.seen < t and not body.stale and t - body.seen < 1.0
+        if waits and clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
+            total += _MISS
+        elif body.seen == t and _limps(body, t):
+            x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
+            x, y = 2.0 * body.x - x, 2.0 * body.y - y
+            if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
+                total += _LIMP
+    return total
+
+
+@njit(cache=True)
+def _limps(body: Any, t: float) -> bool:
+    """Whether somebody walks of whom both legs are seen mostly (a shoe is up half of the time), and now one is not."""
+    if body.robot or body.wide > 0.3 or np.hypot(body.vx, body.vy) < _WALKS:
+        return False
+    return bool(body.hits > _SEEN and body.both > _MOSTLY * body.hits and t - min(body.a_seen, body.b_seen) > _UP_S)

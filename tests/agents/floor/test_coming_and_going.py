@@ -1,0 +1,168 @@
+"""Who comes and who goes: by the door and not through a wall, on two legs, and away from where he began."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tms_agents.floor import FloorSettings, Scene, Vanished
+from tms_agents.floor.association import Association
+from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
+from tms_agents.floor.bodies import narrow
+from tms_agents.floor.freespace import vacant
+from tms_agents.floor.likelihood import costs
+from tms_agents.floor.masks import Masks
+from tms_agents.floor.missing import missed
+from tms_agents.floor.review import CONFIRM, NOTHING, review
+from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
+from tms_agents.floor.state import BODY, PRINT, empty
+from tms_agents.floor.tracks import Tracks
+
+NOW = 100.0
+ROOM = [(0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0)]
+DOOR = [(4.5, 1.0), (5.5, 1.0), (5.5, 2.0), (4.5, 2.0)]
+#: A laser at the origin that looks along x and sees walls 8 m away.
+STEP = 0.01
+OPEN = (np.full(101, 8.0), np.full(101, BACKGROUND, np.int8), np.full(101, 8.0), np.zeros(3), -0.5, STEP)
+
+
+def tracks(gates: list[list[tuple[float, float]]], region: list[tuple[float, float]] | None = None) -> Tracks:
+    return Tracks(Association(2), FloorSettings(), Scene(region=region, gates=gates))
+
+
+def walker(body: np.ndarray, x: float, y: float, v: tuple[float, float], seen: float) -> None:
+    """Somebody believed who was seen last at (x, y) and has gone on at v since."""
+    body["used"] = body["confirmed"] = body["label"] = 1
+    body["hits"], body["both"], body["quality"], body["own_pace_n"] = 300, 250, 1.0, 5
+    gone = NOW - seen
+    body["x"], body["y"], body["vx"], body["vy"] = x + gone * v[0], y + gone * v[1], *v
+    body["told_x"], body["told_y"], body["seen"], body["rest_at"] = x, y, seen, seen
+    body["a_seen"] = body["b_seen"] = seen
+    body["ax"], body["bx"], body["ay"], body["by"] = x, x, y + 0.1, y - 0.1
+
+
+@pytest.mark.parametrize(
+    ("y", "region", "left"),
+    [(1.5, ROOM, True), (3.0, ROOM, False), (1.5, None, False)],
+    ids=["by the door", "through a wall", "no walls known"],
+)
+def test_who_walks_out_of_the_door_has_left_before_a_second_is_over(
+    y: float, region: list[tuple[float, float]] | None, left: bool
+) -> None:
+    one = tracks([DOOR], region)
+    walker(one.bodies[0], 4.7, y, (1.0, 0.0), NOW - 0.7)
+    events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    assert [type(event) for event in events] == ([Vanished] if left else [])
+
+
+def test_who_is_hidden_while_he_stands_in_the_door_has_not_left() -> None:
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], 5.1, 1.5, (0.0, 0.0), NOW - 0.7)
+    one.bodies["rest_at"] = NOW - 10.0
+    assert one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True) == []
+
+
+def test_where_the_door_is_feet_count_a_little_outside_too() -> None:
+    clusters = np.zeros(3, CLUSTER)
+    clusters["x"], clusters["y"] = (5.25, 5.25, 5.45), (1.5, 3.0, 1.5)
+    assert Masks(ROOM, [], [DOOR])(clusters.copy())["y"].tolist() == [1.5]
+    assert Masks(ROOM, [])(clusters.copy()).size == 0
+    assert Masks(ROOM, [DOOR], [DOOR])(clusters.copy()).size == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "price"),
+    [({}, 0.8), ({"vx": 0.1}, 0.0), ({"both": 90}, 0.0), ({"b_seen": NOW - 0.5}, 0.0), ({"robot": 1}, 0.0)],
+    ids=["walks", "stands", "shoes", "a moment", "robot"],
+)
+def test_a_walker_of_whom_one_leg_is_missing_is_a_worse_explanation(change: dict[str, float], price: float) -> None:
+    """Else a seated person takes one leg of whoever passes, and both have one from then on."""
+    bodies, rows = empty(BODY, 1), np.zeros(1, np.int64)
+    walker(bodies[0], 3.0, 0.0, (1.0, 0.0), NOW)
+    bodies["b_seen"] = NOW - 0.7
+    for name, value in change.items():
+        bodies[name] = value
+    assert missed(bodies, rows, NOW, OPEN) == pytest.approx(price)
+
+
+def test_a_leg_behind_somebody_is_not_missed() -> None:
+    bodies, rows = empty(BODY, 1), np.zeros(1, np.int64)
+    walker(bodies[0], 3.0, 0.0, (1.0, 0.0), NOW)
+    bodies["b_seen"] = NOW - 0.7
+    before = (np.full(101, 2.0), np.full(101, FOREGROUND, np.int8), *OPEN[2:])
+    assert missed(bodies, rows, NOW, before) == 0.0
+
+
+@pytest.mark.parametrize(("width", "far", "cheap"), [(0.1, 0.7, False), (0.4, 0.7, True), (0.1, 0.2, True)])
+def test_a_robot_seen_as_a_sliver_in_a_door_does_not_become_the_leg_of_who_comes_in(
+    width: float, far: float, cheap: bool
+) -> None:
+    bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
+    bodies["used"] = bodies["confirmed"] = bodies["robot"] = bodies["machine"] = 1
+    bodies["far"], bodies["width"], bodies["seen"] = far, 0.05, NOW - 0.1
+    clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.1, 8, width, 0.01
+    cost, zero = np.zeros((1, 3)), np.zeros(1, np.int64)
+    costs(clusters, zero - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, zero, NOW, cost)
+    assert (cost[0, 0] < 3.0) == cheap
+
+
+def scan(ranges: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Ranges and states of a wall at 8 m, but for these beams."""
+    values, states = OPEN[0].copy(), OPEN[1].copy()
+    for beam, r in ranges.items():
+        values[beam] = r
+        states[beam] = FOREGROUND if math.isfinite(r) else NO_ECHO
+    return values, states
+
+
+@pytest.mark.parametrize("silence", [math.inf, math.nan])
+def test_one_beam_of_a_dark_leg_may_be_somebody(silence: float) -> None:
+    """What is dark echoes here and there: how wide it is nobody knows."""
+    rays = np.zeros((101, 10))
+    angles = -0.5 + STEP * np.arange(101)
+    rays[:, 2], rays[:, 3], rays[:, 8] = np.cos(angles), np.sin(angles), 1e9
+    found = []
+    for beside in (silence, 8.0):
+        ranges, states = scan({49: beside, 50: 2.5, 51: beside} if math.isfinite(beside) is False else {50: 2.5})
+        segment = Segmenter(np.full(101, STEP), math.radians(15))
+        (cluster,) = segment(ranges, states, np.zeros(101, np.bool_), OPEN[2], rays)
+        found.append((int(cluster["cut"]), bool(narrow(cluster))))
+    assert found == [(FADES, False), (0, True)]
+
+
+@pytest.mark.parametrize(
+    ("beam", "empty_there"),
+    [(8.0, True), (2.0, True), (3.0, False), (math.inf, False), (math.nan, False)],
+    ids=["passes", "stopped before", "met", "silent", "error"],
+)
+def test_a_place_is_empty_if_beams_pass_it_or_cannot_reach_it(beam: float, empty_there: bool) -> None:
+    ranges, _ = scan(dict.fromkeys(range(45, 56), beam))
+    assert vacant(3.0, 0.0, 0.03, ranges, *OPEN[2:]) == empty_there
+    behind_nothing = np.full(101, np.inf)
+    assert vacant(3.0, 0.0, 0.03, ranges, behind_nothing, *OPEN[3:]) == (empty_there or beam != 3.0)
+
+
+@pytest.mark.parametrize(
+    ("there", "believed"), [(8.0, True), (math.inf, False), (3.0, False)], ids=["left", "dark", "still there"]
+)
+def test_who_is_believed_has_gone_from_where_he_began(there: float, believed: bool) -> None:
+    """Of a dark cabinet now this part echoes and now that: nobody walks along it."""
+    bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
+    bodies["used"], bodies["hits"], bodies["looks"], bodies["score"] = 1, 20, 20, 20.0
+    bodies["first"], bodies["seen"], bodies["x0"], bodies["x"], bodies["y"] = NOW - 2.0, NOW, 3.0, 3.0, 0.5
+    bodies["a_seen"], bodies["b_seen"] = NOW, NOW - 0.1
+    bodies["ax"] = bodies["bx"] = 3.0
+    bodies["ay"] = bodies["by"] = 0.5
+    ranges, states = scan(dict.fromkeys(range(45, 56), there) if there != 8.0 else {})
+    review(bodies, NOW, 0.1, ranges, states, *OPEN[2:], 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+    assert actions[0] == (CONFIRM if believed else NOTHING)
+
+
+def test_what_is_not_believed_for_long_is_nobody() -> None:
+    bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
+    bodies["used"], bodies["hits"], bodies["looks"], bodies["score"] = 1, 70, 70, 20.0
+    bodies["first"], bodies["seen"], bodies["x"] = NOW - 7.0, NOW, 0.3
+    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+    assert bodies["used"][0] == 0
