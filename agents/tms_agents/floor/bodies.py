@@ -105,6 +105,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.shoe, body.leg, body.odd = 0.0, 0.0, 0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
+    body.girth, body.girth_n, body.own_girth, body.own_girth_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure = 0.0, 0, 1.0
 
 

@@ -40,8 +40,8 @@ _WAITS_S, _STOPS_S = 25.0, 8.0
 _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
-#: Of saved states; 5: whose foot a print was taken for, and which part of a thing was met.
-_FORMAT = 5
+#: Of saved states; 6: how wide the legs are of whoever has a name.
+_FORMAT = 6
 
 
 class FloorEstimator:

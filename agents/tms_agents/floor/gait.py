@@ -25,6 +25,8 @@ _EXPECTED, _LONG = 20.0, 1000.0
 _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 #: So many stances tell somebody's beat of late, and his own.
 _PACE_MEMORY, _PACE_LIFE = 12, 80
+#: So many sightings of legs tell how wide they are of late, and of the one who has the name.
+_GIRTH_MEMORY, _GIRTH_LIFE = 300, 1000
 #: Whose name is less sure does not change what is known of the name.
 SURE = 0.6
 #: Where shoes are seen, at least this share of all feet that walk is as wide as one (of legs it is 0.03 at most). Of
@@ -108,7 +110,20 @@ def shod(body: Any, c: Any) -> None:
     if c.cut == 0:
         body.shoe += 0.04 * ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - body.shoe)
         if np.hypot(body.vx, body.vy) > _WALKS:
+            if c.width < _SHOE_M[0]:
+                _girth(body, c.width)
             body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
+
+
+@njit(cache=True)
+def _girth(body: Any, width: float) -> None:
+    """Learn from a leg ``width`` m wide how wide the legs of the body are."""
+    body.girth_n = min(body.girth_n + 1, _GIRTH_MEMORY)
+    body.girth += (width - body.girth) / body.girth_n
+    if body.sure < SURE:
+        return
+    body.own_girth_n = min(body.own_girth_n + 1, _GIRTH_LIFE)
+    body.own_girth += (width - body.own_girth) / body.own_girth_n
 
 
 @njit(cache=True)

@@ -24,6 +24,8 @@ _PATCHES = 0.12
 #: Standard deviations (s) of one stance, seen of a shoe or of a leg, and of how somebody walks of late; nothing tells
 #: more than so many deviations.
 _PACE, _PACE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
+#: Standard deviations (m) of how wide a leg looks in one sighting (a few beams, scans alike), and of late.
+_WIDTH_M, _TROUSERS_M = 0.015, 0.004
 #: So many sightings make a look that somebody can be known by; so many stances a beat.
 _SEEN, _WALKED = 40, 8
 #: Who is found again may be anybody who is so near (m), this much as likely.
@@ -46,6 +48,9 @@ def alike(body: Any, name: Any, scattered: Array) -> float:
         stance = _PACE if body.shoe >= SHOES else _PACE_OF_LEGS
         variance = stance**2 * (1.0 / body.pace_n + 1.0 / name.own_pace_n) + _MOOD**2
         value -= 0.5 * min((body.pace - name.own_pace) ** 2 / variance, _FAR**2)
+    if body.girth_n > 0 and name.own_girth_n >= _SEEN and body.shoe < SHOES:
+        variance = _WIDTH_M**2 * (1.0 / body.girth_n + 1.0 / name.own_girth_n) + _TROUSERS_M**2
+        value -= 0.5 * min((body.girth - name.own_girth) ** 2 / variance, _FAR**2)
     return value
 
 
@@ -101,6 +106,7 @@ def unite(
             belief[b] = mixed[b]
             bodies[b].look_n = 0
             bodies[b].pace_n = 0
+            bodies[b].girth_n = 0
 
 
 @njit(cache=True)

@@ -263,7 +263,7 @@ class Tracks:
             old = self.absent.find(body, self._association.scattered)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
-            for field in ("own", "own_n", "own_pace", "own_pace_n"):
+            for field in ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n"):
                 body[field] = old[field]
             old["used"] = 0
             body["confirmed"], body["label"], body["first"] = 1, label, first
