@@ -35,6 +35,9 @@ _LATELY_S = 0.5
 _LEFT_S, _LEFT = 1.0, 0.5
 #: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
 _ROLL_M, _ROLLED_M = 0.08, 0.17
+#: A leg is so wide at most (m), and known after so many sightings; one sighting errs by so much (m), and counts for so
+#: much at most: the next one errs alike.
+_LEG_M, _MEASURED, _GIRTH_M, _OTHER = 0.16, 40, 0.02, 4.0
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
@@ -78,6 +81,14 @@ def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float,
         share = max(away - reach, 0.0) / max(away, 1e-6)
         dx, dy = dx * share, dy * share
     return float(0.5 * (dx * dx + dy * dy) / 0.1**2 + 2.5)
+
+
+@njit(cache=True)
+def _stouter(body: Any, c: Any) -> float:
+    """Negative log likelihood of a leg being so much wider or narrower than those of the one who has the name."""
+    if body.own_girth_n < _MEASURED or body.shoe >= SHOES or c.cut or c.width > _LEG_M:
+        return 0.0
+    return float(0.5 * min(((c.width - body.own_girth) / _GIRTH_M) ** 2, _OTHER))
 
 
 @njit(cache=True)
@@ -167,6 +178,7 @@ def costs(
                 shape += 2.0 if c.n == 1 else 6.0
             if c.attached:
                 shape += 4.0
+            shape += _stouter(body, c)
             anywhere = (
                 _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
             )
