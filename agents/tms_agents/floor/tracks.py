@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tms_agents.floor.absent import Absent
-from tms_agents.floor.association import Association
+from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.masks import Area
@@ -263,7 +263,7 @@ class Tracks:
             old = self.absent.find(body, self._association.scattered)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
-            for field in ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n"):
+            for field in OWN:
                 body[field] = old[field]
             old["used"] = 0
             body["confirmed"], body["label"], body["first"] = 1, label, first

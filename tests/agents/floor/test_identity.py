@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.floor.gait import beat
+from tms_agents.floor.gait import beat, shod
 from tms_agents.floor.identity import alike, christen, renamed, unite
+from tms_agents.floor.likelihood import costs
+from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn
-from tms_agents.floor.state import BODY, empty
+from tms_agents.floor.state import BODY, PRINT, empty
 
 VARIANCE = 0.01
 
@@ -96,3 +98,59 @@ def test_who_is_not_known_yet_is_like_anybody() -> None:
     bodies["own_n"][1] = bodies["own_pace_n"][1] = 0
     assert alike(bodies[0], bodies[1], expected()) == 0.0
     assert alike(bodies[1], bodies[0], expected()) < -2.0
+
+
+def stride(body, width: float, cut: int = 0, sightings: int = 60) -> None:
+    """A leg of so wide is seen so often while somebody walks."""
+    leg = np.zeros(1, CLUSTER)[0]
+    leg["width"], leg["cut"], body["vx"] = width, cut, 1.0
+    for _ in range(sightings):
+        shod(body, leg)
+
+
+def two_walkers() -> tuple[np.ndarray, np.ndarray]:
+    """Two people who look and walk alike, but for their legs: 9 and 12 cm."""
+    bodies, belief = people((7.0, 0.6), (7.0, 0.6))
+    bodies["shoe"] = 0.0
+    for body, width in zip(bodies, (0.09, 0.12), strict=True):
+        stride(body, width)
+    return bodies, belief
+
+
+@pytest.mark.parametrize(("now", "expected_names"), [((0.09, 0.12), [0, 1]), ((0.12, 0.09), [1, 0])])
+def test_how_wide_their_legs_are_tells_who_is_who_after_a_meeting(
+    now: tuple[float, float], expected_names: list[int]
+) -> None:
+    bodies, belief = two_walkers()
+    meet(bodies, belief, 0.0)
+    names(bodies, belief)  # now nobody is sure who is who
+    for body, width in zip(bodies, now, strict=True):
+        stride(body, width)
+    assert names(bodies, belief) == expected_names
+
+
+@pytest.mark.parametrize(("shoe", "cut", "told"), [(0.0, 0, True), (1.0, 0, False), (0.0, 1, False)])
+def test_shoes_and_what_is_half_hidden_tell_no_width(shoe: float, cut: int, told: bool) -> None:
+    bodies, belief = two_walkers()
+    meet(bodies, belief, 0.0)
+    names(bodies, belief)
+    stride(bodies[0], 0.12, cut)
+    bodies["shoe"] = shoe
+    assert (alike(bodies[0], bodies[0], expected()) < alike(bodies[0], bodies[1], expected())) == told
+
+
+@pytest.mark.parametrize(("width", "cut", "dearer"), [(0.12, 0, True), (0.12, 1, False), (0.3, 0, False)])
+def test_a_leg_wider_than_any_of_his_is_less_likely_his(width: float, cut: int, dearer: bool) -> None:
+    bodies, _ = two_walkers()
+    clusters, prints = np.zeros(1, CLUSTER), empty(PRINT, 1)
+    clusters["n"], clusters["width"], clusters["spacing"], clusters["cut"] = 10, width, 0.01, cut
+    price = []
+    for row in (0, 1):
+        cost = np.zeros((1, 3))
+        one, zero = np.array([row]), np.zeros(1, np.int64)
+        bodies["x"] = bodies["ax"] = bodies["bx"] = 0.0
+        bodies["a_seen"] = bodies["b_seen"] = 0.9
+        bodies["a_print"] = bodies["b_print"] = -1
+        costs(clusters, zero - 1, np.full((1, 4), np.nan), np.ones(1, np.bool_), prints, bodies, one, 1.0, cost)
+        price.append(cost[0, 0])
+    assert (price[0] > price[1] + 0.5) == dearer
