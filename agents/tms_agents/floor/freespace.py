@@ -245,16 +245,22 @@ def look(
 
 
 @njit(cache=True)
+def _towards(x: float, y: float, half: float, pose: Array, first: float, step: float, n: int) -> tuple[float, int, int]:
+    """How far (x, y) is, m, and the first and last of the n beams that meet it ± half m (0 and -1: none)."""
+    away = np.hypot(x - pose[0], y - pose[1])
+    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
+    if np.isnan(middle):
+        return away, 0, -1
+    reach = np.arctan(half / max(away, 0.05)) / abs(step)
+    return away, max(0, int(np.ceil(middle - reach - 0.5))), min(n - 1, int(middle + reach + 0.5))
+
+
+@njit(cache=True)
 def silent(
     x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
 ) -> bool:
     """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy."""
-    away = np.hypot(x - pose[0], y - pose[1])
-    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, ranges.size)
-    if np.isnan(middle):
-        return False
-    reach = np.arctan(half / max(away, 0.05)) / abs(step)
-    low, high = max(0, int(np.ceil(middle - reach - 0.5))), min(ranges.size - 1, int(middle + reach + 0.5))
+    away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
     count = 0
     for i in range(low, high + 1):
         if not np.isfinite(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
@@ -267,18 +273,13 @@ def vacant(
     x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
 ) -> bool:
     """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent."""
-    away = np.hypot(x - pose[0], y - pose[1])
-    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, ranges.size)
-    if np.isnan(middle):
-        return True
-    reach = np.arctan(half / max(away, 0.05)) / abs(step)
-    passes, total = 0, 0
-    for i in range(max(0, int(middle - reach)), min(ranges.size - 1, int(middle + reach + 1)) + 1):
-        total += 1
+    away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+    passes = 0
+    for i in range(low, high + 1):
         known = np.isfinite(ranges[i])
         if (known and abs(ranges[i] - away) > _DEEP_M) or (not known and not np.isfinite(longest[i])):
             passes += 1
-    return bool(2 * passes >= total)
+    return bool(2 * passes >= high - low + 1)
 
 
 @njit(cache=True)

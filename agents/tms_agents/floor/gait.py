@@ -93,15 +93,20 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
 
 
 @njit(cache=True)
+def _mean(mean: float, count: int, value: float, most: int) -> tuple[float, int]:
+    """The mean of so many values, and how many, with one more; it forgets after ``most``."""
+    count = min(count + 1, most)
+    return mean + (value - mean) / count, count
+
+
+@njit(cache=True)
 def beat(body: Any, stood: float, swung: float) -> None:
     """Learn from a stance of ``stood`` s, before a swing of ``swung`` s, at what beat the body walks."""
     if _STANCE_S[0] < stood < _STANCE_S[1] and _SWING_S[0] < swung < _SWING_S[1]:
-        body.pace_n = min(body.pace_n + 1, _PACE_MEMORY)
-        body.pace += (stood - body.pace) / body.pace_n
+        body.pace, body.pace_n = _mean(body.pace, body.pace_n, stood, _PACE_MEMORY)
         if body.sure < SURE:
             return
-        body.own_pace_n = min(body.own_pace_n + 1, _PACE_LIFE)
-        body.own_pace += (stood - body.own_pace) / body.own_pace_n
+        body.own_pace, body.own_pace_n = _mean(body.own_pace, body.own_pace_n, stood, _PACE_LIFE)
 
 
 @njit(cache=True)
@@ -118,12 +123,10 @@ def shod(body: Any, c: Any) -> None:
 @njit(cache=True)
 def _girth(body: Any, width: float) -> None:
     """Learn from a leg ``width`` m wide how wide the legs of the body are."""
-    body.girth_n = min(body.girth_n + 1, _GIRTH_MEMORY)
-    body.girth += (width - body.girth) / body.girth_n
+    body.girth, body.girth_n = _mean(body.girth, body.girth_n, width, _GIRTH_MEMORY)
     if body.sure < SURE:
         return
-    body.own_girth_n = min(body.own_girth_n + 1, _GIRTH_LIFE)
-    body.own_girth += (width - body.own_girth) / body.own_girth_n
+    body.own_girth, body.own_girth_n = _mean(body.own_girth, body.own_girth_n, width, _GIRTH_LIFE)
 
 
 @njit(cache=True)
