@@ -12,7 +12,7 @@ from tms_agents.simulation.floor_world.movers import Mover
 from tms_agents.simulation.floor_world.room import Thing
 from tms_agents.simulation.floor_world.shapes import BLACK, Material, Pose, Xy
 from tms_agents.simulation.floor_world.standing import standing
-from tms_agents.simulation.floor_world.stories import cross, leave, new_thing, pick, push, put, sit, wander
+from tms_agents.simulation.floor_world.stories import arrival, cross, leave, new_thing, pick, push, put, sit, wander
 from tms_agents.simulation.floor_world.tasks import Drag, Face, Go, Story, Wait
 from tms_agents.simulation.floor_world.visits import visits
 
@@ -34,11 +34,6 @@ class Scenario:
     quiet_s: float = QUIET_S
 
 
-def _come_in(life: Life, i: int = 0) -> Xy:
-    doors = life.plan.doors
-    return life.plan.outside(doors[i % len(doors)], life.rng)
-
-
 def _crossing(people: int, eager: float, closest_m: float = 0.38) -> Callable[[Life, float], None]:
     def write(life: Life, duration: float) -> None:
         life.closest_m = closest_m
@@ -49,7 +44,7 @@ def _crossing(people: int, eager: float, closest_m: float = 0.38) -> Callable[[L
                 yield from cross(life, me, until, eager)
                 yield from leave(life, me)
 
-            life.person(f"p{i + 1}", QUIET_S + life.rng.uniform(0, 1.5) + 2.2 * i, _come_in(life, i), story)
+            life.person(f"p{i + 1}", QUIET_S + life.rng.uniform(0, 1.5) + 2.2 * i, arrival(life, i), story)
 
     return write
 
@@ -77,7 +72,7 @@ def _things(life: Life, duration: float, materials: tuple[Material | None, ...] 
         yield from leave(life, me)
 
     for i in range(2):
-        life.person(f"p{i + 1}", QUIET_S + 1 + 6 * i, _come_in(life), story)
+        life.person(f"p{i + 1}", QUIET_S + 1 + 6 * i, arrival(life), story)
 
 
 def _glossy(life: Life, duration: float) -> None:
@@ -156,9 +151,9 @@ def _hidden(life: Life, duration: float) -> None:
         yield Go(life.random_place(0.5, life.ways(me)), 40)
         yield from leave(life, me)
 
-    life.person("p1", QUIET_S + 1, _come_in(life), porter)
-    life.person("p2", QUIET_S + 14, _come_in(life), visitor)
-    life.robot("r1", QUIET_S + 30, _come_in(life), machine, ROBOT_SIZE)
+    life.person("p1", QUIET_S + 1, arrival(life), porter)
+    life.person("p2", QUIET_S + 14, arrival(life), visitor)
+    life.robot("r1", QUIET_S + 30, arrival(life), machine, ROBOT_SIZE)
 
 
 def _start(life: Life, duration: float) -> None:
@@ -194,8 +189,8 @@ def _bed(life: Life, duration: float) -> None:
         yield from wander(life, me, duration - 20)
         yield from leave(life, me)
 
-    life.person("p1", QUIET_S + 1, _come_in(life), sitter)
-    life.person("p2", QUIET_S + 18, _come_in(life), visitor)
+    life.person("p1", QUIET_S + 1, arrival(life), sitter)
+    life.person("p2", QUIET_S + 18, arrival(life), visitor)
 
 
 def _furniture(life: Life, duration: float) -> None:
@@ -241,7 +236,7 @@ def _furniture(life: Life, duration: float) -> None:
     life.hang_door()
     life.at(QUIET_S + 0.5, swing(life.rng.uniform(0.0, 0.35)))
     life.at(duration - 12, swing(math.pi / 2))
-    life.person("p1", QUIET_S + 3, _come_in(life), mover)
+    life.person("p1", QUIET_S + 3, arrival(life), mover)
 
 
 def _robots(life: Life, duration: float) -> None:
@@ -261,8 +256,8 @@ def _robots(life: Life, duration: float) -> None:
         yield from leave(life, me)
 
     for i in range(2):
-        life.robot(f"r{i + 1}", QUIET_S + 1 + 12 * i, _come_in(life), machine, ROBOT_SIZE)
-        life.person(f"p{i + 1}", QUIET_S + 5 + 9 * i, _come_in(life), person)
+        life.robot(f"r{i + 1}", QUIET_S + 1 + 12 * i, arrival(life), machine, ROBOT_SIZE)
+        life.person(f"p{i + 1}", QUIET_S + 5 + 9 * i, arrival(life), person)
 
 
 def _parts(life: Life, duration: float) -> None:
@@ -277,7 +272,7 @@ def _parts(life: Life, duration: float) -> None:
         yield from leave(life, me)
 
     for i in range(3):
-        life.person(f"p{i + 1}", QUIET_S + 1 + 5 * i, _come_in(life), person)
+        life.person(f"p{i + 1}", QUIET_S + 1 + 5 * i, arrival(life), person)
 
 
 def _mirror(life: Life, duration: float) -> None:
@@ -289,7 +284,7 @@ def _mirror(life: Life, duration: float) -> None:
         yield from leave(life, me)
 
     for i in range(2):
-        life.person(f"p{i + 1}", QUIET_S + 1 + 7 * i, _come_in(life), person)
+        life.person(f"p{i + 1}", QUIET_S + 1 + 7 * i, arrival(life), person)
 
 
 def _nobody(life: Life, duration: float) -> None:
@@ -313,9 +308,9 @@ def _crowd(life: Life, duration: float) -> None:
             yield Wait(me.rng.uniform(1, 5))
 
     for i in range(8):
-        life.person(f"p{i + 1}", QUIET_S + 1.5 * i, _come_in(life, i), person)
+        life.person(f"p{i + 1}", QUIET_S + 1.5 * i, arrival(life, i), person)
     for i in range(2):
-        life.robot(f"r{i + 1}", QUIET_S + 14 + 8 * i, _come_in(life, i), machine, ROBOT_SIZE)
+        life.robot(f"r{i + 1}", QUIET_S + 14 + 8 * i, arrival(life, i), machine, ROBOT_SIZE)
 
 
 SCENARIOS: dict[str, Scenario] = {

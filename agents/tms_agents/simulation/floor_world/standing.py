@@ -10,7 +10,7 @@ from tms_agents.simulation.floor_world.life import Life
 from tms_agents.simulation.floor_world.movers import Mover
 from tms_agents.simulation.floor_world.room import Thing
 from tms_agents.simulation.floor_world.shapes import Material, Xy
-from tms_agents.simulation.floor_world.stories import cross, leave, would_see
+from tms_agents.simulation.floor_world.stories import arrival, cross, leave, would_see
 from tms_agents.simulation.floor_world.tasks import Do, Face, Go, Story, Wait
 
 #: Shortest and longest stand, and between two shifts of the weight: restless, at ease, like a statue (s).
@@ -55,12 +55,9 @@ def standing(life: Life, duration: float, quiet_s: float) -> None:
         yield from cross(life, me, duration - 30, 0.3)
         yield from leave(life, me)
 
-    def come_in() -> Xy:
-        return life.plan.outside(life.plan.doors[0], life.rng)
-
     for i in range(2):
-        life.person(f"p{i + 1}", quiet_s + 1 + 6 * i, come_in(), lambda me: stand(life, me, duration))
-    life.person("p3", quiet_s + 40, come_in(), passer)
+        life.person(f"p{i + 1}", quiet_s + 1 + 6 * i, arrival(life), lambda me: stand(life, me, duration))
+    life.person("p3", quiet_s + 40, arrival(life), passer)
 
 
 def _look(life: Life, me: Mover) -> Xy:

@@ -42,6 +42,12 @@ def cross(life: Life, me: Mover, until: float, eager: float) -> Story:
             yield Wait(me.rng.uniform(0.5, 6.0))
 
 
+def arrival(life: Life, i: int = 0) -> Xy:
+    """Where somebody comes from: a place in the corridor by a door, out of sight; ``i`` counts the doors through."""
+    doors = life.plan.doors
+    return life.plan.outside(doors[i % len(doors)], life.rng)
+
+
 def leave(life: Life, me: Mover) -> Story:
     """Out of the nearest door and out of sight."""
     doors = life.plan.doors

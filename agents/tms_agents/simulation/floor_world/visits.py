@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from tms_agents.simulation.floor_world.life import Life
 from tms_agents.simulation.floor_world.movers import Mover
-from tms_agents.simulation.floor_world.shapes import Xy
-from tms_agents.simulation.floor_world.stories import leave, new_thing, pick, put, wander
+from tms_agents.simulation.floor_world.stories import arrival, leave, new_thing, pick, put, wander
 from tms_agents.simulation.floor_world.tasks import Go, Story, Wait
 
 _SIZES = (0.05, 0.08, 0.12)
@@ -38,11 +37,7 @@ def visits(life: Life, duration: float, quiet_s: float, robot: tuple[float, floa
     while t < duration - 25:
         count += 1
         if life.rng.random() < _ROBOTS:
-            life.robot(f"r{count}", t, _door(life), machine, robot)
+            life.robot(f"r{count}", t, arrival(life), machine, robot)
         else:
-            life.person(f"p{count}", t, _door(life), person)
+            life.person(f"p{count}", t, arrival(life), person)
         t += life.rng.uniform(1.5, 4) if life.rng.random() < _PAIRS else life.rng.uniform(10, 24)
-
-
-def _door(life: Life) -> Xy:
-    return life.plan.outside(life.plan.doors[life.rng.integers(len(life.plan.doors))], life.rng)
