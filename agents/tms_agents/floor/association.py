@@ -27,7 +27,7 @@ _NEAR_M, _ALIKE = 0.08, 0.3
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
-OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n")
+OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
 NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
 _BLANK = np.zeros(1, CLUSTER)
 

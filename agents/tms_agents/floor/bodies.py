@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from tms_agents.floor.gait import foot, middle, shod, swap
+from tms_agents.floor.build import size_up, wears_shoes
+from tms_agents.floor.gait import foot, middle, swap
 from tms_agents.floor.segmentation import FADES
 
 #: Acceleration noise (m²/s³) and how fast the memory of a velocity fades while nothing is seen (s).
@@ -61,9 +62,18 @@ def narrow(c: Any) -> bool:
 
 @njit(cache=True)
 def together(body: Any, clusters: Any, i: int, t: float) -> bool:
-    """Whether cluster i is wide enough for both feet of the body, is where they stood, and none is seen beside it."""
+    """Whether cluster i is wide enough for both feet of the body, is where they stood, and none is seen beside it.
+
+    Legs may be one thing to the laser; of shoes one is seen or two.
+    """
     c = clusters[i]
-    if c.width < max(0.16, 1.4 * body.width) or body.robot or t - body.a_seen > 1.0 or t - body.b_seen > 1.0:
+    if (
+        c.width < max(0.16, 1.4 * body.width)
+        or body.robot
+        or wears_shoes(body)
+        or t - body.a_seen > 1.0
+        or t - body.b_seen > 1.0
+    ):
         return False
     reach = 0.5 * c.width + 0.05
     if np.hypot(c.x - body.ax, c.y - body.ay) > reach or np.hypot(c.x - body.bx, c.y - body.by) > reach:
@@ -106,6 +116,8 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
     body.girth, body.girth_n, body.own_girth, body.own_girth_n = 0.0, 0, 0.0, 0
+    body.ex, body.ey, body.e_at = 0.0, 0.0, -1e9
+    body.sole, body.sole_n, body.own_sole, body.own_sole_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure = 0.0, 0, 1.0
 
 
@@ -152,13 +164,13 @@ def update(
     if has_c:
         if c_print != body.a_print and speed > 0.35 and t - body.b_seen < 0.4:
             _stride(body, c.x - body.bx, c.y - body.by, speed, 1.0)
-        shod(body, c)
+        size_up(body, c)
         foot(body, c, c_late, c_print, prints, t)
         body.score += footlike(c)
     if has_d:
         if d_print != body.b_print and speed > 0.35 and t - body.a_seen < 0.4:
             _stride(body, d.x - body.ax, d.y - body.ay, speed, -1.0)
-        shod(body, d)
+        size_up(body, d)
         swap(body)
         foot(body, d, d_late, d_print, prints, t)
         swap(body)

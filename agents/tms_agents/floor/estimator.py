@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import FOREGROUND
+from tms_agents.floor.build import count_shoes, legs
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
-from tms_agents.floor.gait import count_shoes, legs
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.own_feet import exchange
@@ -41,7 +41,7 @@ _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
 #: Of saved states; 6: how wide the legs are of whoever has a name.
-_FORMAT = 6
+_FORMAT = 7
 
 
 class FloorEstimator:

@@ -11,33 +11,16 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from tms_agents.floor.build import SHOES, beat, from_side
 
 #: A foot that moved by so much (m) since the last scan swings; a stance elsewhere than the last (m) is another one.
 _SWING_M, _STANCE_M = 0.05, 0.12
-#: A shoe seems to move so far (m) when it rolls off. Of such a share of wide feet somebody's shoes are seen, not legs.
-_ROLL_M, SHOES, _SHOE_M = 0.17, 0.3, (0.16, 0.34)
-#: Legs are measured while somebody walks faster than this (m/s): nothing else does.
-_WALKS = 0.4
-#: Legs are expected as if so many had been seen; so many feet are remembered.
-_EXPECTED, _LONG = 20.0, 1000.0
-#: A foot stands and swings for so long (s) while somebody walks.
-_STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
-#: So many stances tell somebody's beat of late, and his own.
-_PACE_MEMORY, _PACE_LIFE = 12, 80
-#: So many sightings of legs tell how wide they are of late, and of the one who has the name.
-_GIRTH_MEMORY, _GIRTH_LIFE = 300, 1000
-#: Whose name is less sure does not change what is known of the name.
-SURE = 0.6
-#: Where shoes are seen, at least this share of all feet that walk is as wide as one (of legs it is 0.03 at most). Of
-#: somebody alone (`shoe`) it is unlearned while he seems to stand on a narrow thing.
-SHOD = 0.2
+#: A shoe seems to move so far (m) when it rolls off.
+_ROLL_M = 0.17
+#: Who walks has put down the other shoe after this (s).
+_STEP_S = 0.65
 NOTHING = (0.0, 0.0, np.inf, 0.0, 0.0, np.inf)
-
-
-def legs() -> NDArray[np.float64]:
-    """What is known of feet before anybody was seen, as `count_shoes` learns it."""
-    return np.array([0.0, _EXPECTED])
 
 
 @njit(cache=True)
@@ -77,6 +60,8 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
             swings = c_print != body.a_print and t - since < 0.05 and body.shoe < SHOES
     body.ax, body.ay, body.a_seen, body.a_print, body.a_since = c.x, c.y, t, c_print, since
     body.a_late = late
+    if body.shoe >= SHOES and from_side(c):
+        body.ex, body.ey, body.e_at = c.ex, c.ey, t
     if swings:
         return
     elsewhere = _ROLL_M if body.shoe >= SHOES else _STANCE_M
@@ -90,60 +75,6 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
         body.a_px += 0.4 * (c.x - body.a_px)
         body.a_py += 0.4 * (c.y - body.a_py)
     body.a_stood = t
-
-
-@njit(cache=True)
-def _mean(mean: float, count: int, value: float, most: int) -> tuple[float, int]:
-    """The mean of so many values, and how many, with one more; it forgets after ``most``."""
-    count = min(count + 1, most)
-    return mean + (value - mean) / count, count
-
-
-@njit(cache=True)
-def beat(body: Any, stood: float, swung: float) -> None:
-    """Learn from a stance of ``stood`` s, before a swing of ``swung`` s, at what beat the body walks."""
-    if _STANCE_S[0] < stood < _STANCE_S[1] and _SWING_S[0] < swung < _SWING_S[1]:
-        body.pace, body.pace_n = _mean(body.pace, body.pace_n, stood, _PACE_MEMORY)
-        if body.sure < SURE:
-            return
-        body.own_pace, body.own_pace_n = _mean(body.own_pace, body.own_pace_n, stood, _PACE_LIFE)
-
-
-@njit(cache=True)
-def shod(body: Any, c: Any) -> None:
-    """Learn from a foot whether shoes are seen, flat on the floor, or legs, and how wide these are."""
-    if c.cut == 0:
-        body.shoe += 0.04 * ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - body.shoe)
-        if np.hypot(body.vx, body.vy) > _WALKS:
-            if c.width < _SHOE_M[0]:
-                _girth(body, c.width)
-            body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
-
-
-@njit(cache=True)
-def _girth(body: Any, width: float) -> None:
-    """Learn from a leg ``width`` m wide how wide the legs of the body are."""
-    body.girth, body.girth_n = _mean(body.girth, body.girth_n, width, _GIRTH_MEMORY)
-    if body.sure < SURE:
-        return
-    body.own_girth, body.own_girth_n = _mean(body.own_girth, body.own_girth_n, width, _GIRTH_LIFE)
-
-
-@njit(cache=True)
-def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, shoes: NDArray[np.float64]) -> None:
-    """Learn from everybody who walks whether this laser sees shoes or legs: ``of`` (m,), the prints of the clusters.
-
-    ``shoes`` (2,): of the feet, the share as wide as a shoe from its side, and how many were seen.
-    """
-    for b in range(bodies.size):
-        body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or body.seen < t or np.hypot(body.vx, body.vy) < _WALKS:
-            continue
-        for i in range(clusters.size):
-            c = clusters[i]
-            if of[i] >= 0 and not c.cut and (body.a_print == of[i] or body.b_print == of[i]):
-                shoes[1] = min(shoes[1] + 1.0, _LONG)
-                shoes[0] += ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - shoes[0]) / shoes[1]
 
 
 @njit(cache=True)
@@ -190,20 +121,25 @@ def _astride(body: Any, t: float) -> tuple[float, float, float, float, float, fl
         qx, qy, px, py, ox, oy, age = body.b_px, body.b_py, body.a_px, body.a_py, body.b_ox, body.b_oy, t - body.b_land
     dx, dy = qx - px, qy - py
     if age < 0.3:
-        share = -0.4 + 0.8 * age
+        share = -0.32 + 1.1 * age if body.shoe >= SHOES else -0.4 + 0.8 * age
         noise = 0.08 + 0.2 * age
-        vx, vy, slow = _going(dx, dy, qx - ox, qy - oy)
+        vx, vy, slow = _going(body, dx, dy, qx - ox, qy - oy, t)
         return qx + share * dx, qy + share * dy, noise * noise, vx, vy, slow
     noise = max(0.05, 0.17 - 0.1 * (age - 0.3))
     return qx - 0.5 * dx, qy - 0.5 * dy, noise * noise, 0.0, 0.0, 0.4**2
 
 
 @njit(cache=True)
-def _going(dx: float, dy: float, ox: float, oy: float) -> tuple[float, float, float]:
+def _going(body: Any, dx: float, dy: float, ox: float, oy: float, t: float) -> tuple[float, float, float]:
     """Velocity (m/s) and its variance by the step (dx, dy) to the other foot and the stride (ox, oy) of this one."""
     if np.hypot(ox, oy) > 1.8:
         return 1.4 * dx, 1.4 * dy, 0.5**2
-    return 0.83 * dx + 0.3 * ox, 0.83 * dy + 0.3 * oy, 0.35**2
+    vx, vy = 0.83 * dx + 0.3 * ox, 0.83 * dy + 0.3 * oy
+    if body.e_at == t:
+        # A shoe points where he goes, or back: the line on which it lies tells no more.
+        ahead = 0.42 if vx * body.ex + vy * body.ey > 0.0 else -0.42
+        return 0.32 * dx + 0.3 * ox + ahead * body.ex, 0.32 * dy + 0.3 * oy + ahead * body.ey, 0.25**2
+    return vx, vy, 0.35**2
 
 
 @njit(cache=True)
@@ -233,10 +169,13 @@ def _alone(body: Any, t: float) -> tuple[float, float, float, float, float, floa
     if body.a_land < body.b_land:
         # The other had landed later and is up again: this one may be a foot that waits.
         return body.a_px - 0.3 * dx, body.a_py - 0.3 * dy, 0.18**2, 0.0, 0.0, np.inf
-    share = min(-0.36 + 1.05 * age, 0.15)
+    if body.shoe >= SHOES:
+        share = min(-0.3 + 1.1 * age, 0.33) if age < _STEP_S else 0.15
+    else:
+        share = min(-0.36 + 1.05 * age, 0.15)
     noise = 0.08 + 0.3 * age
     vx, vy, slow = 0.0, 0.0, np.inf
     if age < 0.4:
-        vx, vy, slow = _going(dx, dy, body.a_px - body.a_ox, body.a_py - body.a_oy)
+        vx, vy, slow = _going(body, dx, dy, body.a_px - body.a_ox, body.a_py - body.a_oy, t)
         slow *= 1.0 + 4.0 * age
     return body.a_px + share * dx, body.a_py + share * dy, noise * noise, vx, vy, slow

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
-from tms_agents.floor.gait import SHOES
+from tms_agents.floor.build import LEGS_KNOWN, SHOES, SHOES_KNOWN
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ _PATCHES = 0.12
 _PACE, _PACE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
 #: Standard deviations (m) of how wide a leg looks in one sighting (a few beams, scans alike), and of late.
 _WIDTH_M, _TROUSERS_M = 0.015, 0.004
+#: The same of how long a shoe looks.
+_SOLE_M, _SOLES_M = 0.012, 0.003
 #: So many sightings make a look that somebody can be known by; so many stances a beat.
 _SEEN, _WALKED = 40, 8
 #: Who is found again may be anybody who is so near (m), this much as likely.
@@ -48,9 +50,12 @@ def alike(body: Any, name: Any, scattered: Array) -> float:
         stance = _PACE if body.shoe >= SHOES else _PACE_OF_LEGS
         variance = stance**2 * (1.0 / body.pace_n + 1.0 / name.own_pace_n) + _MOOD**2
         value -= 0.5 * min((body.pace - name.own_pace) ** 2 / variance, _FAR**2)
-    if body.girth_n > 0 and name.own_girth_n >= _SEEN and body.shoe < SHOES:
+    if body.girth_n > 0 and name.own_girth_n >= LEGS_KNOWN and body.shoe < SHOES:
         variance = _WIDTH_M**2 * (1.0 / body.girth_n + 1.0 / name.own_girth_n) + _TROUSERS_M**2
         value -= 0.5 * min((body.girth - name.own_girth) ** 2 / variance, _FAR**2)
+    if body.sole_n > 0 and name.own_sole_n >= SHOES_KNOWN and body.shoe >= SHOES:
+        variance = _SOLE_M**2 * (1.0 / body.sole_n + 1.0 / name.own_sole_n) + _SOLES_M**2
+        value -= 0.5 * min((body.sole - name.own_sole) ** 2 / variance, _FAR**2)
     return value
 
 
@@ -107,6 +112,7 @@ def unite(
             bodies[b].look_n = 0
             bodies[b].pace_n = 0
             bodies[b].girth_n = 0
+            bodies[b].sole_n = 0
 
 
 @njit(cache=True)

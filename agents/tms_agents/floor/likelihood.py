@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, together
-from tms_agents.floor.gait import SHOES
+from tms_agents.floor.build import LEGS_KNOWN, SHOES, SHOES_KNOWN, WALKS, astray, from_side, sole
 from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
 
@@ -35,9 +35,11 @@ _LATELY_S = 0.5
 _LEFT_S, _LEFT = 1.0, 0.5
 #: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
 _ROLL_M, _ROLLED_M = 0.08, 0.17
-#: A leg is so wide at most (m), and known after so many sightings; one sighting errs by so much (m), and counts for so
-#: much at most: the next one errs alike.
-_LEG_M, _MEASURED, _GIRTH_M, _OTHER = 0.16, 40, 0.02, 4.0
+#: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
+#: alike.
+_LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
+#: The same of the length of a shoe; the sine of how far it points from the way.
+_SOLE_M, _TURNED = 0.015, 0.5
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
@@ -55,11 +57,21 @@ def _apart(dx: float, dy: float, body: Any, speed: float, along: float, aside: f
 
 
 @njit(cache=True)
-def _landing(dx: float, dy: float, body: Any, speed: float, side: float) -> float:
+def _landing(dx: float, dy: float, c: Any, body: Any, speed: float, side: float) -> float:
     """The same of a foot landing (dx, dy) from the other: a stride ahead and on its own side."""
     ux, uy = body.vx / speed, body.vy / speed
-    ahead, aside = dx * ux + dy * uy - body.stride, dy * ux - dx * uy - side
-    return float(0.5 * (ahead**2 / (0.15**2 + 0.2 * body.pp) + aside**2 / (0.1**2 + 0.2 * body.pp)) + 2.4)
+    behind, along, across, rare = 0.0, 0.15, 0.1, 2.4
+    if body.shoe >= SHOES:
+        if from_side(c):
+            # The shoe points where he is going now.
+            sign = 1.0 if ux * c.ex + uy * c.ey > 0.0 else -1.0
+            ux, uy = sign * c.ex, sign * c.ey
+            behind, along, across, rare = 0.0, 0.13, 0.12, 2.44
+        else:
+            # Of a shoe the heel is seen first.
+            behind, along, across, rare = 0.15, 0.2, 0.17, 3.2
+    ahead, aside = dx * ux + dy * uy - body.stride + behind, dy * ux - dx * uy - side
+    return float(0.5 * (ahead**2 / (along**2 + 0.2 * body.pp) + aside**2 / (across**2 + 0.2 * body.pp)) + rare)
 
 
 @njit(cache=True)
@@ -86,9 +98,22 @@ def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float,
 @njit(cache=True)
 def _stouter(body: Any, c: Any) -> float:
     """Negative log likelihood of a leg being so much wider or narrower than those of the one who has the name."""
-    if body.own_girth_n < _MEASURED or body.shoe >= SHOES or c.cut or c.width > _LEG_M:
+    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > _LEG_M:
         return 0.0
     return float(0.5 * min(((c.width - body.own_girth) / _GIRTH_M) ** 2, _OTHER))
+
+
+@njit(cache=True)
+def _another_shoe(body: Any, c: Any) -> float:
+    """Negative log likelihood of a shoe that is longer or shorter than his, or does not point where he goes."""
+    if body.shoe < SHOES or not from_side(c):
+        return 0.0
+    value = 0.0
+    if body.own_sole_n >= SHOES_KNOWN:
+        value += 0.5 * min(((sole(c) - body.own_sole) / _SOLE_M) ** 2, _OTHER)
+    if np.hypot(body.vx, body.vy) > WALKS:
+        value += 0.5 * min((astray(body, c) / _TURNED) ** 2, _OTHER)
+    return value
 
 
 @njit(cache=True)
@@ -178,7 +203,7 @@ def costs(
                 shape += 2.0 if c.n == 1 else 6.0
             if c.attached:
                 shape += 4.0
-            shape += _stouter(body, c)
+            shape += _stouter(body, c) + _another_shoe(body, c)
             anywhere = (
                 _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
             )
@@ -228,7 +253,7 @@ def costs(
                     value = min(value, step)
                     if speed > 0.35 and gap < 1.3 and t - other < 0.4:
                         side = body.side if which == 0 else -body.side
-                        value = min(value, _landing(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
+                        value = min(value, _landing(c.x - ox, c.y - oy, c, body, speed, side) + step - anywhere)
                 cost[i, 2 * column + which] = shape + value
     # Both feet in one cluster: whatever else is near is not a foot of this body.
     for column in range(k):

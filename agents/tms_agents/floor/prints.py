@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.build import SHOD, SHOES
 from tms_agents.floor.freespace import FREE, WALLED, clear, silent
-from tms_agents.floor.gait import SHOD, SHOES
 from tms_agents.floor.shine import STRANGE, strangeness
 
 Array = NDArray[np.float64]
@@ -222,7 +222,7 @@ def _hides_none(q: Any, other_seen: float, t: float) -> bool:
 def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoes: Array) -> None:
     """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy).
 
-    ``scattered`` (3,) is what `shine.scatter` has learned, ``shoes`` (2,) what `gait.count_shoes` has.
+    ``scattered`` (3,) is what `shine.scatter` has learned, ``shoes`` (2,) what `build.count_shoes` has.
     """
     shod = shoes[0] > SHOD
     for b in range(bodies.size):

@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
+from tms_agents.floor.build import SHOES, wears_shoes
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
-from tms_agents.floor.gait import SHOES
 from tms_agents.floor.prints import ALONE
 
 Array = NDArray[np.float64]
@@ -37,6 +37,8 @@ _PARKED_S = 5.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
+#: Two legs that are one thing to the laser are wider (m) than one; no shoe is so long (m).
+_LEGS_M, _LONG_SHOE_M = 0.2, 0.31
 #: What moved with people beside it for this share of its way may have been pushed.
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
@@ -62,7 +64,8 @@ _TELL_M = 0.05
 @njit(cache=True)
 def _is_lone(body: Any, t: float) -> bool:
     """Whether all that is seen of a person, unmoved for some time, may be a thing or two."""
-    if body.robot or body.wide > 0.6 or body.width > 0.2:
+    no_shoe = wears_shoes(body) and body.width > _LONG_SHOE_M
+    if body.robot or body.wide > 0.6 or (body.width > _LEGS_M and not no_shoe):
         return False
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)
     a, b = t - body.a_seen, t - body.b_seen
@@ -70,7 +73,7 @@ def _is_lone(body: Any, t: float) -> bool:
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
-    if _has_walked(body) and body.older < _OLDER_S and not body.odd and both:
+    if _has_walked(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S

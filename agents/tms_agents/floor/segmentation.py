@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 #: A cluster in the room frame: (x, y) m of the middle of the thing, (width m) across the beams, (n) beams, (near) its
 #: range, (first, last) beam, (cut) partly hidden behind something nearer, 2: that is new, (attached) its surface goes
 #: on as background: a piece of furniture or wall, (gap) m to the background behind it, (mirror) seen in a mirror (-1:
-#: directly). Of what is dark not every beam comes back: cut `FADES` beside beams that bring nothing.
+#: directly), (ex, ey) the line from one end to the other, a unit vector, and the sine between it and the beams (slant).
+#: Of what is dark not every beam comes back: cut `FADES` beside beams that bring nothing.
 FADES = 3
 CLUSTER = np.dtype(
     [
@@ -31,6 +32,9 @@ CLUSTER = np.dtype(
         ("attached", "i8"),
         ("gap", "f8"),
         ("mirror", "i8"),
+        ("ex", "f8"),
+        ("ey", "f8"),
+        ("slant", "f8"),
     ]
 )
 #: The middle of a thing lies behind the surface seen by this share of its width (discs 0.39, boxes 0.3 to 0.5).
@@ -146,6 +150,7 @@ def _segment(
         by = rays[b, o + 1] + ranges[b] * rays[b, o + 3]
         c.spacing = c.near * step[min(a, n - 1)]
         c.width = np.hypot(ax - bx, ay - by) + c.spacing
+        _lies(c, bx - ax, by - ay, rays[(a + b) // 2, o + 2], rays[(a + b) // 2, o + 3])
         c.attached = 0
         if a > 0 and (states[a - 1] == BACKGROUND or claimed[a - 1]) and _goes_on(ranges, longest, a - 1, a, b):
             c.attached = 1
@@ -164,6 +169,16 @@ def _segment(
         c.x += shift * rays[middle, o + 2]
         c.y += shift * rays[middle, o + 3]
     return count
+
+
+@njit(cache=True)
+def _lies(c: Any, dx: float, dy: float, u: float, v: float) -> None:
+    """Note which way the cluster points, from end (dx, dy) m to end, and how much across the beam (u, v)."""
+    far = np.hypot(dx, dy)
+    c.ex, c.ey, c.slant = 0.0, 0.0, 1.0
+    if far > 0.0:
+        c.ex, c.ey = dx / far, dy / far
+        c.slant = abs(u * c.ey - v * c.ex)
 
 
 @njit(cache=True)

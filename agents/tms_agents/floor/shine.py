@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.gait import SURE
+from tms_agents.floor.build import SURE
 
 Array = NDArray[np.float64]
 

@@ -58,10 +58,11 @@ PRINT = np.dtype(
 #: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began,
 #: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
 #: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
-#: who it is (look, pace, girth), and of the one whose name it has (own, own_pace, own_girth); sure is how likely that
-#: name is. Further: for how long (s) and where it has stood on one foot alone (lone), for how long what it stands on
-#: had been nobody's before (older, s), where and since when it has stayed (rest), how wide the legs are (m, 0:
-#: unknown), whether what is seen of it is no foot, and why (odd, `prints.UNLIKE`).
+#: who it is (look, pace, girth, sole), and of the one whose name it has (own, own_pace, own_girth, own_sole); sure is
+#: how likely that name is. Further: for how long (s) and where it has stood on one foot alone (lone), for how long what
+#: it stands on had been nobody's before (older, s), where and since when it has stayed (rest), how wide the legs are
+#: (m, 0: unknown), whether what is seen of it is no foot, and why (odd, `prints.UNLIKE`), and the line on which the
+#: shoe last seen from its side lay (ex, ey), and when (e_at).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -138,6 +139,9 @@ BODY = np.dtype(
         ("shoe", "f8"),
         ("leg", "f8"),
         ("odd", "i8"),
+        ("ex", "f8"),
+        ("ey", "f8"),
+        ("e_at", "f8"),
         ("shine", "f8"),
         ("shine_n", "i8"),
         ("own", "f8"),
@@ -150,6 +154,10 @@ BODY = np.dtype(
         ("girth_n", "i8"),
         ("own_girth", "f8"),
         ("own_girth_n", "i8"),
+        ("sole", "f8"),
+        ("sole_n", "i8"),
+        ("own_sole", "f8"),
+        ("own_sole_n", "i8"),
         ("look", "f8"),
         ("look_n", "i8"),
         ("sure", "f8"),

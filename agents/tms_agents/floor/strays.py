@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from tms_agents.floor.gait import SHOES, swap
+from tms_agents.floor.build import SHOES
+from tms_agents.floor.gait import swap
 from tms_agents.floor.prints import unlike_foot
 
 #: Nobody stands with the shoes or the legs so far apart (m) for so long (s).

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tms_agents.floor.bodies import begin
-from tms_agents.floor.gait import SHOD, count_shoes, foot, legs, middle, swap
+from tms_agents.floor.gait import foot, middle, swap
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
 
@@ -57,17 +57,3 @@ def test_a_foot_that_swings_tells_where_the_body_goes() -> None:
 
 def test_nothing_seen_tells_nothing() -> None:
     assert np.isinf(middle(walker(1.0, 1.0), 5.0)[2])
-
-
-@pytest.mark.parametrize(
-    ("width", "speed", "cut", "shod"),
-    [(0.24, 1.0, 0, True), (0.11, 1.0, 0, False), (0.24, 0.0, 0, False), (0.24, 1.0, 1, False)],
-)
-def test_shoes_are_told_from_legs_by_everybody_who_walks(width: float, speed: float, cut: int, shod: bool) -> None:
-    bodies, clusters, shoes = empty(BODY, 2), np.zeros(2, CLUSTER), legs()
-    bodies["used"] = bodies["confirmed"] = 1
-    bodies["vx"], bodies["a_print"], bodies["b_print"] = speed, (0, 1), -1
-    clusters["width"], clusters["cut"] = width, cut
-    for _ in range(10):
-        count_shoes(bodies, clusters, np.arange(2), 0.0, shoes)
-    assert (shoes[0] > SHOD) == shod

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.floor.gait import beat, shod
+from tms_agents.floor.build import beat, size_up
 from tms_agents.floor.identity import alike, christen, renamed, unite
 from tms_agents.floor.likelihood import costs
 from tms_agents.floor.segmentation import CLUSTER
@@ -101,32 +101,42 @@ def test_who_is_not_known_yet_is_like_anybody() -> None:
 
 
 def stride(body, width: float, cut: int = 0, sightings: int = 60) -> None:
-    """A leg of so wide is seen so often while somebody walks."""
+    """A leg so wide, or a shoe so long from its side, is seen so often while somebody walks."""
     leg = np.zeros(1, CLUSTER)[0]
-    leg["width"], leg["cut"], body["vx"] = width, cut, 1.0
+    leg["width"], leg["cut"], leg["ex"], leg["slant"], body["vx"] = width, cut, 1.0, 1.0, 1.0
     for _ in range(sightings):
-        shod(body, leg)
+        size_up(body, leg)
 
 
-def two_walkers() -> tuple[np.ndarray, np.ndarray]:
-    """Two people who look and walk alike, but for their legs: 9 and 12 cm."""
+def two_walkers(*sizes: float) -> tuple[np.ndarray, np.ndarray]:
+    """Two people who look and walk alike, but for their legs, 9 and 12 cm, or other ``sizes``, as of their shoes."""
+    sizes = sizes or (0.09, 0.12)
     bodies, belief = people((7.0, 0.6), (7.0, 0.6))
-    bodies["shoe"] = 0.0
-    for body, width in zip(bodies, (0.09, 0.12), strict=True):
+    bodies["shoe"] = 1.0 if min(sizes) > 0.16 else 0.0
+    for body, width in zip(bodies, sizes, strict=True):
         stride(body, width)
     return bodies, belief
 
 
-@pytest.mark.parametrize(("now", "expected_names"), [((0.09, 0.12), [0, 1]), ((0.12, 0.09), [1, 0])])
-def test_how_wide_their_legs_are_tells_who_is_who_after_a_meeting(
-    now: tuple[float, float], expected_names: list[int]
+@pytest.mark.parametrize("sizes", [(0.09, 0.12), (0.25, 0.28)])
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_how_wide_legs_and_how_long_shoes_are_tells_who_is_who_after_a_meeting(
+    sizes: tuple[float, float], exchanged: bool
 ) -> None:
-    bodies, belief = two_walkers()
+    bodies, belief = two_walkers(*sizes)
     meet(bodies, belief, 0.0)
     names(bodies, belief)  # now nobody is sure who is who
-    for body, width in zip(bodies, now, strict=True):
+    for body, width in zip(bodies, sizes[::-1] if exchanged else sizes, strict=True):
         stride(body, width)
-    assert names(bodies, belief) == expected_names
+    assert names(bodies, belief) == ([1, 0] if exchanged else [0, 1])
+
+
+def test_names_exchanged_unnoticed_are_given_back_within_a_few_steps() -> None:
+    bodies, belief = two_walkers(0.25, 0.28)
+    assert names(bodies, belief) == [0, 1]
+    for body, length in zip(bodies, (0.28, 0.25), strict=True):
+        stride(body, length, sightings=25)
+    assert names(bodies, belief) == [1, 0]
 
 
 @pytest.mark.parametrize(("shoe", "cut", "told"), [(0.0, 0, True), (1.0, 0, False), (0.0, 1, False)])
@@ -139,18 +149,33 @@ def test_shoes_and_what_is_half_hidden_tell_no_width(shoe: float, cut: int, told
     assert (alike(bodies[0], bodies[0], expected()) < alike(bodies[0], bodies[1], expected())) == told
 
 
-@pytest.mark.parametrize(("width", "cut", "dearer"), [(0.12, 0, True), (0.12, 1, False), (0.3, 0, False)])
-def test_a_leg_wider_than_any_of_his_is_less_likely_his(width: float, cut: int, dearer: bool) -> None:
-    bodies, _ = two_walkers()
+@pytest.mark.parametrize(
+    ("width", "cut", "dearer"), [(0.12, 0, True), (0.12, 1, False), (0.3, 0, False), (0.28, 0, True), (0.28, 1, False)]
+)
+def test_a_foot_of_another_size_than_his_is_less_likely_his(width: float, cut: int, dearer: bool) -> None:
+    bodies, _ = two_walkers() if width in (0.12, 0.3) else two_walkers(0.25, 0.28)
+    price = [_price(bodies, row, width, cut) for row in (0, 1)]
+    assert (price[0] > price[1] + 0.5) == dearer
+
+
+@pytest.mark.parametrize(("turned", "speed", "dearer"), [(1.2, 1.0, True), (0.1, 1.0, False), (1.2, 0.1, False)])
+def test_a_shoe_that_points_another_way_than_he_goes_is_less_likely_his(
+    turned: float, speed: float, dearer: bool
+) -> None:
+    bodies, _ = two_walkers(0.25, 0.25)
+    bodies["vx"] = speed
+    assert (_price(bodies, 0, 0.25, turned=turned) > _price(bodies, 0, 0.25) + 0.5) == dearer
+
+
+def _price(bodies, row: int, width: float, cut: int = 0, turned: float = 0.0) -> float:
+    """What it costs that a cluster so wide, which points so far from the x axis (rad), is a foot of the body."""
     clusters, prints = np.zeros(1, CLUSTER), empty(PRINT, 1)
     clusters["n"], clusters["width"], clusters["spacing"], clusters["cut"] = 10, width, 0.01, cut
-    price = []
-    for row in (0, 1):
-        cost = np.zeros((1, 3))
-        one, zero = np.array([row]), np.zeros(1, np.int64)
-        bodies["x"] = bodies["ax"] = bodies["bx"] = 0.0
-        bodies["a_seen"] = bodies["b_seen"] = 0.9
-        bodies["a_print"] = bodies["b_print"] = -1
-        costs(clusters, zero - 1, np.full((1, 4), np.nan), np.ones(1, np.bool_), prints, bodies, one, 1.0, cost)
-        price.append(cost[0, 0])
-    assert (price[0] > price[1] + 0.5) == dearer
+    clusters["ex"], clusters["ey"], clusters["slant"] = np.cos(turned), np.sin(turned), 1.0
+    cost = np.zeros((1, 3))
+    one, zero = np.array([row]), np.zeros(1, np.int64)
+    bodies["x"] = bodies["ax"] = bodies["bx"] = 0.0
+    bodies["a_seen"] = bodies["b_seen"] = 0.9
+    bodies["a_print"] = bodies["b_print"] = -1
+    costs(clusters, zero - 1, np.full((1, 4), np.nan), np.ones(1, np.bool_), prints, bodies, one, 1.0, cost)
+    return float(cost[0, 0])

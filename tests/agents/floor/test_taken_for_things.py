@@ -9,7 +9,7 @@ from floor_rooms import Circle, Room
 from tms_agents.floor import Appeared
 from tms_agents.floor.background import BACKGROUND, FOREGROUND
 from tms_agents.floor.bodies import stuck
-from tms_agents.floor.gait import SHOD, legs
+from tms_agents.floor.build import SHOD, legs
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.prints import ALONE, UNLIKE, attend, follow, lay_before
 from tms_agents.floor.review import LOST, review

@@ -1,0 +1,125 @@
+"""How somebody is built and walks, as far as a laser near the floor sees it: legs or shoes, their size, the beat.
+
+A shoe seen from its side shows its heel and its toes: how long it is tells people apart (simulated: known to 0.7 cm,
+standard deviation, after one stance, where people differ by 1.4 cm), and which way it points tells whose step it is.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+#: Of such a share of wide feet somebody's shoes are seen, not legs; so wide (m) is a shoe from its side.
+SHOES, _SHOE_M = 0.3, (0.16, 0.34)
+#: Legs and shoes are measured while somebody walks faster than this (m/s): nothing else does.
+WALKS = 0.4
+#: Legs are expected as if so many had been seen; so many feet are remembered.
+_EXPECTED, _LONG = 20.0, 1000.0
+#: A foot stands and swings for so long (s) while somebody walks.
+_STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
+#: So many stances tell somebody's beat of late, and his own.
+_PACE_MEMORY, _PACE_LIFE = 12, 80
+#: So many sightings tell how wide somebody's legs are of late, how long his shoes, and both of who has the name.
+_LEGS_MEMORY, _SHOES_MEMORY, _SIZE_LIFE = 300, 15, 1000
+#: So many sightings of legs, or of shoes from the side, tell how wide or how long they are.
+LEGS_KNOWN, SHOES_KNOWN = 40, 10
+#: Whose name is less sure does not change what is known of the name.
+SURE = 0.6
+#: Where shoes are seen, at least this share of all feet that walk is as wide as one (of legs it is 0.03 at most). Of
+#: somebody alone (`shoe`) it is unlearned while he seems to stand on a narrow thing.
+SHOD = 0.2
+#: The toes and the heel of a shoe are that wide, as a share of its length (`sole`); both are in view if it looks so
+#: wide (m), and it points along the way (sine of the angle).
+_TOES, _SIDE_M, _ASTRAY = 0.3, 0.19, 0.5
+
+
+def legs() -> NDArray[np.float64]:
+    """What is known of feet before anybody was seen, as `count_shoes` learns it."""
+    return np.array([0.0, _EXPECTED])
+
+
+@njit(cache=True)
+def mean(value: float, count: int, new: float, most: int) -> tuple[float, int]:
+    """The mean of so many values, and how many, with one more; it forgets after ``most``."""
+    count = min(count + 1, most)
+    return value + (new - value) / count, count
+
+
+@njit(cache=True)
+def beat(body: Any, stood: float, swung: float) -> None:
+    """Learn from a stance of ``stood`` s, before a swing of ``swung`` s, at what beat the body walks."""
+    if _STANCE_S[0] < stood < _STANCE_S[1] and _SWING_S[0] < swung < _SWING_S[1]:
+        body.pace, body.pace_n = mean(body.pace, body.pace_n, stood, _PACE_MEMORY)
+        if body.sure >= SURE:
+            body.own_pace, body.own_pace_n = mean(body.own_pace, body.own_pace_n, stood, _PACE_LIFE)
+
+
+@njit(cache=True)
+def size_up(body: Any, c: Any) -> None:
+    """Learn from a foot whether shoes are seen, flat on the floor, or legs, and how long or wide these are."""
+    if c.cut != 0:
+        return
+    body.shoe += 0.04 * ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - body.shoe)
+    speed = np.hypot(body.vx, body.vy)
+    if speed < WALKS:
+        return
+    body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
+    if c.width < _SHOE_M[0]:
+        body.girth, body.girth_n = mean(body.girth, body.girth_n, c.width, _LEGS_MEMORY)
+        if body.sure >= SURE:
+            body.own_girth, body.own_girth_n = mean(body.own_girth, body.own_girth_n, c.width, _SIZE_LIFE)
+    elif from_side(c) and astray(body, c) < _ASTRAY:
+        length = sole(c)
+        body.sole, body.sole_n = mean(body.sole, body.sole_n, length, _SHOES_MEMORY)
+        if body.sure >= SURE:
+            body.own_sole, body.own_sole_n = mean(body.own_sole, body.own_sole_n, length, _SIZE_LIFE)
+
+
+@njit(cache=True)
+def wears_shoes(body: Any) -> bool:
+    """Whether shoes are what was seen of him when he walked: two legs side by side may look like one from its side."""
+    return bool(body.own_sole_n >= SHOES_KNOWN)
+
+
+@njit(cache=True)
+def from_side(c: Any) -> bool:
+    """Whether the cluster, if a shoe, shows its heel and its toes."""
+    return bool(c.cut == 0 and _SIDE_M < c.width < _SHOE_M[1])
+
+
+@njit(cache=True)
+def astray(body: Any, c: Any) -> float:
+    """The sine of the angle between the way the body goes and the way the cluster points, if it is a shoe."""
+    return float(abs(body.vx * c.ey - body.vy * c.ex) / max(np.hypot(body.vx, body.vy), 1e-6))
+
+
+@njit(cache=True)
+def sole(c: Any) -> float:
+    """How long (m) the shoe is that is seen from its side.
+
+    The ends of what is seen of two discs, toes and heel, with their middles 0.7 of a length apart: aslant it shows less
+    than its length, the less the more it points along the beam.
+    """
+    slope = 2.0 * _TOES * c.slant
+    a = (1.0 - _TOES) ** 2 - _TOES**2
+    return float(c.width * (np.sqrt(slope * slope + 4.0 * a) - slope) / (2.0 * a))
+
+
+@njit(cache=True)
+def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, shoes: NDArray[np.float64]) -> None:
+    """Learn from everybody who walks whether this laser sees shoes or legs: ``of`` (m,), the prints of the clusters.
+
+    ``shoes`` (2,): of the feet, the share as wide as a shoe from its side, and how many were seen.
+    """
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not body.used or not body.confirmed or body.robot or body.seen < t or np.hypot(body.vx, body.vy) < WALKS:
+            continue
+        for i in range(clusters.size):
+            c = clusters[i]
+            if of[i] >= 0 and not c.cut and (body.a_print == of[i] or body.b_print == of[i]):
+                shoes[1] = min(shoes[1] + 1.0, _LONG)
+                shoes[0] += ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - shoes[0]) / shoes[1]
