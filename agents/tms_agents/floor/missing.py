@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.freespace import FREE, HIDDEN, clear
+from tms_agents.floor.freespace import FREE, HIDDEN, WALLED, beam_of, clear
 
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
@@ -32,6 +32,22 @@ def missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
             if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
                 total += _LIMP
     return total
+
+
+@njit(cache=True)
+def look(bodies: Any, t: float, sight: Any) -> None:
+    """Count for all who are not believed yet in how many scans they were seen or should have been."""
+    ranges, states, longest, pose, first, step = sight
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not body.used or body.confirmed:
+            continue
+        if body.seen < t:
+            view = clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step)
+            turned = np.arctan2(body.y - pose[1], body.x - pose[0]) - pose[2]
+            if view in (HIDDEN, WALLED) or np.isnan(beam_of(turned, first, step, ranges.size)):
+                continue
+        body.looks += 1
 
 
 @njit(cache=True)

@@ -51,6 +51,8 @@ _KNOWN = 200
 _STEPS, _BOTH = 3, 30
 #: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
 _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
+#: Who is believed was seen so often, and in this share of the scans that should have shown him.
+_HITS, _STEADY = 4.0, 0.6
 #: Who walks is believed after so long (s), or never.
 _UNSURE_S = 6.0
 #: Where somebody began looks free, or he still stands there, within this (m).
@@ -216,7 +218,8 @@ def review(
             if body.wide > 0.5:
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
-            if age >= needed_s and way >= needed_m and body.hits >= 4 and body.score >= max(3.0, 0.45 * body.hits):
+            steady = body.hits >= max(_HITS, _STEADY * body.looks)
+            if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, 0.45 * body.hits):
                 came = _has_come(body, t, ranges, longest, pose, first, step)
                 actions[b] = CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
             continue

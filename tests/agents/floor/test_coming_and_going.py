@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from floor_rooms import Room
 
-from tms_agents.floor import FloorSettings, Scene, Vanished
+from tms_agents.floor import Appeared, FloorSettings, Scene, Vanished
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
@@ -166,3 +167,29 @@ def test_what_is_not_believed_for_long_is_nobody() -> None:
     bodies["first"], bodies["seen"], bodies["x"] = NOW - 7.0, NOW, 0.3
     review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
     assert bodies["used"][0] == 0
+
+
+@pytest.mark.parametrize(("seen", "believed"), [((1, 1, 1, 1), 1), ((1, 0, 1, 0), 0)], ids=["always", "now and then"])
+def test_who_is_not_there_in_every_other_scan_is_nobody(seen: tuple[int, ...], believed: int) -> None:
+    """Of a far edge that beams just hit or just miss, parts echo here and there: that may look like steps."""
+
+    def edge(t: float) -> list[tuple[float, float, float]]:
+        k = round(10.0 * t) - 90
+        return [(3.0, 1.0 + 0.08 * k, 0.06)] if 0 <= k < 24 and seen[k % 4] else []
+
+    _, events = Room(edge).play(14.0)
+    assert len([event for event in events if isinstance(event, Appeared) and event.kind == "mover"]) == believed
+
+
+def test_who_is_hidden_in_every_other_scan_is_somebody() -> None:
+    """What cannot be seen is no reason for not believing it."""
+
+    def slats(t: float) -> list[tuple[float, float, float]]:
+        k = round(10.0 * t) - 90
+        if not 0 <= k < 24:
+            return []
+        x, y = 3.0, 1.0 + 0.08 * k
+        return [(x, y, 0.06)] + ([(0.4 * x, 0.4 * y, 0.12)] if k % 2 else [])
+
+    _, events = Room(slats).play(14.0)
+    assert [event for event in events if isinstance(event, Appeared) and event.kind == "mover"]
