@@ -158,7 +158,7 @@ class Furniture:
                 thin and not self._grouped(piece, pieces, _THIN_M + spacing)
             ):
                 continue
-            least = _THIN_WIDTH_M if thin else _WIDTH_M
+            least = _THIN_WIDTH_M if min(width, piece.width) < _THIN_M else _WIDTH_M
             difference = abs(piece.width - width) / (least + 0.15 * max(piece.width, width) + spacing)
             cost = 0.3 * math.hypot(piece.x - print_["x"], piece.y - print_["y"]) / _PUSHED_M + 0.7 * difference
             # What somebody put down must look just like the piece.

@@ -133,3 +133,10 @@ def test_a_thin_thing_is_no_leg_of_a_box_that_went() -> None:
     )
     assert Furniture().explains(alone[0], alone, [leg, other], 5.0)
     assert not Furniture().explains(alone[0], alone, [leg, side], 5.0)
+
+
+@pytest.mark.parametrize(("piece", "is_it"), [(0.03, False), (0.07, True)], ids=["leg of a chair", "as wide"])
+def test_a_thing_is_no_piece_of_furniture_that_was_half_as_wide(piece: float, is_it: bool) -> None:
+    put = thin((2.0, 2.0))
+    put["width"], put["spacing"] = 0.076, 0.015
+    assert Furniture().explains(put[0], put, [Piece(1.0, 2.5, 2.0, piece, 1.0)], 5.0) == is_it
