@@ -34,6 +34,8 @@ _STANCE_M = 0.4
 _STOOD_S = 20.0
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
+#: Of whom no two feet were seen, and who rests for so long (s), is a thing.
+_INERT_S = 30.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
@@ -75,7 +77,7 @@ def _is_lone(body: Any, t: float) -> bool:
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
-    if _has_walked(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
+    if has_walked(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
@@ -85,7 +87,7 @@ def _is_lone(body: Any, t: float) -> bool:
 
 
 @njit(cache=True)
-def _has_walked(body: Any) -> bool:
+def has_walked(body: Any) -> bool:
     """Whether it has come on two feet, step by step."""
     return bool(body.own_pace_n >= _STEPS and body.both >= _BOTH)
 
@@ -122,6 +124,8 @@ def _is_parked(body: Any, t: float) -> bool:
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
         return bool(t - since > _PARKED_S)
+    if t - body.rest_at > _INERT_S and not body.robot and not has_walked(body) and not _is_known(body):
+        return True
     if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
         # It came by itself.
         return False
@@ -140,7 +144,7 @@ def _is_known(body: Any) -> bool:
 @njit(cache=True)
 def is_footless(body: Any) -> bool:
     """Whether it has been broader than two feet side by side, and two feet were hardly ever seen."""
-    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits and not _has_walked(body))
+    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits and not has_walked(body))
 
 
 @njit(cache=True)
@@ -250,7 +254,7 @@ def review(
                 actions[b] = LOST
             elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
                 # Somebody who is known for long has gone on from there.
-                actions[b] = LOST if _is_known(body) or _has_walked(body) else GONE
+                actions[b] = LOST if _is_known(body) or has_walked(body) else GONE
             elif body.stale:
                 actions[b] = BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:

@@ -13,7 +13,7 @@ from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.masks import Area
-from tms_agents.floor.review import BACK, CONFIRM, GONE, LOST, is_footless, review
+from tms_agents.floor.review import BACK, CONFIRM, GONE, LOST, has_walked, is_footless, review
 from tms_agents.floor.settings import FloorSettings, Scene
 
 #: How much what is seen next of somebody lost must look like feet.
@@ -259,7 +259,7 @@ class Tracks:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
         old = self._missing(body)
-        if old is None:
+        if old is None and not is_footless(body):
             old = self.absent.find(body, self._association.scattered)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
@@ -288,8 +288,11 @@ class Tracks:
     def _missing(self, body: Any) -> Any:
         """The mover not seen now that this one most probably is: hidden, seated, or only thought to be seen."""
         best, best_gap = None, 1.0
+        broad = body["wide"] > 0.3 or is_footless(body)
         for other in self.bodies:
             if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
+                continue
+            if broad and not other["robot"] and has_walked(other):
                 continue
             x, y, seen = float(other["x"]), float(other["y"]), float(other["seen"])
             steps = seen > body["first"] + 0.2
