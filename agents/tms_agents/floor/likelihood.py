@@ -38,6 +38,8 @@ _ROLL_M, _ROLLED_M = 0.08, 0.17
 #: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
 #: alike.
 _LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
+#: What is wider than a leg although the other one is elsewhere: as wide as two legs side by side (m), or wider.
+_PAIR_M, _PAIR, _NO_PAIR = 0.27, 2.0, 4.0
 #: The same of the length of a shoe; the sine of how far it points from the way.
 _SOLE_M, _TURNED = 0.015, 0.5
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
@@ -101,6 +103,14 @@ def _stouter(body: Any, c: Any) -> float:
     if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > _LEG_M:
         return 0.0
     return float(0.5 * min(((c.width - body.own_girth) / _GIRTH_M) ** 2, _OTHER))
+
+
+@njit(cache=True)
+def _both_legs(body: Any, c: Any) -> float:
+    """Negative log likelihood of so wide a cluster, which may be both legs, if one of them is seen somewhere else."""
+    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width <= _LEG_M:
+        return 0.0
+    return _PAIR if c.width < _PAIR_M else _NO_PAIR
 
 
 @njit(cache=True)
@@ -204,6 +214,7 @@ def costs(
             if c.attached:
                 shape += 4.0
             shape += _stouter(body, c) + _another_shoe(body, c)
+            broad = _both_legs(body, c)
             anywhere = (
                 _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
             )
@@ -234,6 +245,8 @@ def costs(
                     if swings > 0.5 and t - other < 0.22:
                         swing += _BOTH
                     value = min(value, swing)
+                if broad > 0.0 and t - other < 0.2 and np.hypot(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
+                    value += broad
                 step = anywhere
                 if gap < 0.22 and not left:
                     # Seen just now, it cannot be far, unless it was something that was left behind.

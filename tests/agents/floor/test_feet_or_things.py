@@ -107,3 +107,23 @@ def test_what_is_left_in_a_door_is_told_when_who_left_it_is_elsewhere() -> None:
     (put,) = [event for event in events if isinstance(event, Appeared) and event.kind == "object"]
     assert put.t < 20.0
     assert math.dist(put.xy, (4.0, 2.05)) < 0.03
+
+
+@pytest.mark.parametrize(("width", "apart", "dearer"), [(0.2, True, 2.0), (0.33, True, 4.0), (0.2, False, 0.0)])
+def test_a_foot_as_wide_as_two_legs_is_none_if_the_other_leg_is_seen_somewhere_else(
+    width: float, apart: bool, dearer: float
+) -> None:
+    """Who pushes a bin walks on two legs beside it."""
+    found = []
+    for known in (0, 400):
+        bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
+        bodies["used"] = bodies["confirmed"] = 1
+        bodies["hits"], bodies["looks"], bodies["seen"], bodies["pp"] = 100, 100, 9.9, 0.01
+        bodies["ax"], bodies["a_seen"], bodies["a_print"] = 0.2, 9.9, -1
+        bodies["bx"], bodies["b_seen"], bodies["b_print"] = (-0.2 if apart else 0.2), 9.9, -1
+        bodies["own_girth"], bodies["own_girth_n"] = 0.11, known
+        clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.2, 20, width, 0.01
+        cost, zero = np.zeros((1, 3)), np.zeros(1, np.int64)
+        costs(clusters, zero - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, zero, 10.0, cost)
+        found.append(cost[0, 0])
+    assert found[1] - found[0] == pytest.approx(dearer)
