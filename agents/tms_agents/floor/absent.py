@@ -15,8 +15,8 @@ from tms_agents.floor.state import BODY, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
-#: So near a door (m) people come and go.
-_DOOR_M = 1.0
+#: So near a door (m) people come; who is lost so near one has gone.
+_DOOR_M, _GONE_M = 1.0, 0.3
 #: Who was seen for so many scans is somebody.
 _SOMEBODY = 30
 #: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s).
@@ -24,7 +24,7 @@ _AWAY_M, _SPEED, _WAIT_S = 1.0, 1.0, 20.0
 #: So near (m) where he was lost he may stand, since so long (s) before that at most.
 _STEPS_M, _JUST_S = 1.2, 4.0
 #: Who looks and walks as unlikely as this (log likelihood) is somebody else.
-_UNLIKE = -4.0
+_UNLIKE = -8.0
 
 
 class Absent:
@@ -36,7 +36,7 @@ class Absent:
 
     def keep(self, body: Any) -> bool:
         """Whether this one, of whom nothing is seen any more, must be somewhere: then he is waited for."""
-        inside = math.inf > self._gates.distance(float(body["x"]), float(body["y"])) > _DOOR_M
+        inside = math.inf > self._gates.distance(float(body["x"]), float(body["y"])) > _GONE_M
         somebody = body["hits"] >= _SOMEBODY and not body["robot"] and body["wide"] < 0.3
         if inside and somebody:
             self._bodies.append(body.copy())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.identity import christen, renamed, unite
-from tms_agents.floor.likelihood import UNLIKELY, costs, known
+from tms_agents.floor.likelihood import UNLIKELY, both_legs, costs, known
 from tms_agents.floor.missing import look, missed
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn, scatter
@@ -26,6 +26,8 @@ _CHILDREN = 48
 _NEAR_M, _ALIKE = 0.08, 0.3
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
 _FRESH_S = 0.4
+#: No foot is wider (m); no leg, of who is known to show legs.
+_BROAD_M, _BROAD_LEGS_M = 0.28, 0.2
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
 OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
 NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
@@ -46,13 +48,14 @@ def _crowded(c: Any, bodies: Any) -> bool:
 
 
 @njit(cache=True)
-def _attended(c: Any, bodies: Any, t: float) -> bool:
-    """Whether a person stands beside the cluster."""
+def _pushed(c: Any, bodies: Any, t: float) -> bool:
+    """Whether what begins is too wide for a foot and a person stands beside it."""
     for b in range(bodies.size):
         body = bodies[b]
         person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
         if person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width:
-            return True
+            if c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and both_legs(body, c) > 0.0):
+                return True
     return False
 
 
@@ -145,8 +148,7 @@ def _complete(
         for b in range(bodies.size):
             if not bodies[b].used:
                 begin(bodies[b], c, of[i], t)
-                # What is wide and begins beside somebody is pushed.
-                if c.width > 0.28 and _attended(c, bodies, t):
+                if _pushed(c, bodies, t):
                     bodies[b].from_furniture = 1
                 break
 

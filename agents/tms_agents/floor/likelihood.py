@@ -106,9 +106,9 @@ def _stouter(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
-def _both_legs(body: Any, c: Any) -> float:
+def both_legs(body: Any, c: Any) -> float:
     """Negative log likelihood of so wide a cluster, which may be both legs, if one of them is seen somewhere else."""
-    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width <= _LEG_M:
+    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.width <= _LEG_M:
         return 0.0
     return _PAIR if c.width < _PAIR_M else _NO_PAIR
 
@@ -214,7 +214,7 @@ def costs(
             if c.attached:
                 shape += 4.0
             shape += _stouter(body, c) + _another_shoe(body, c)
-            broad = _both_legs(body, c)
+            broad = both_legs(body, c)
             anywhere = (
                 _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
             )
@@ -281,12 +281,13 @@ def costs(
 
 
 @njit(cache=True)
-def _beside(body: Any, bodies: Any) -> bool:
-    """Whether a mover that is believed is so near that its feet may be taken for another body."""
+def _beside(body: Any, bodies: Any, c: Any) -> bool:
+    """Whether a mover that is believed is so near that its feet may be taken for another body: not what is broader."""
     for b in range(bodies.size):
         other = bodies[b]
         if other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6:
-            return True
+            if both_legs(other, c) == 0.0:
+                return True
     return False
 
 
@@ -297,7 +298,7 @@ def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
         c = clusters[i]
         for b in range(bodies.size):
             body = bodies[b]
-            if body.used and not body.confirmed and t - body.seen < 0.5 and not _beside(body, bodies):
+            if body.used and not body.confirmed and t - body.seen < 0.5 and not _beside(body, bodies, c):
                 near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
                 near = max(min(near, np.hypot(c.x - body.x, c.y - body.y)) - 0.1, 0.0)
                 cost[i, i] = min(cost[i, i], _TENTATIVE + 0.5 * (near / 0.2) ** 2)

@@ -185,7 +185,8 @@ def review(
         if not body.used:
             continue
         unseen = t - body.seen
-        if (body.wide > 0.3 or body.far > _FAR_M) and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
+        broad = body.wide > 0.3 or body.far > _FAR_M or body.from_furniture == 1
+        if broad and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
         if unseen == 0.0 and np.hypot(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
             body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
