@@ -24,7 +24,7 @@ _AWAY_M, _SPEED, _WAIT_S = 1.0, 1.0, 20.0
 #: So near (m) where he was lost he may stand, since so long (s) before that at most.
 _STEPS_M, _JUST_S = 1.2, 4.0
 #: Who looks and walks as unlikely as this (log likelihood) is somebody else.
-_UNLIKE = -8.0
+_UNLIKE = -6.0
 
 
 class Absent:

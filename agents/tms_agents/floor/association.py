@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.identity import christen, renamed, unite
-from tms_agents.floor.likelihood import UNLIKELY, both_legs, costs, known
+from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
 from tms_agents.floor.missing import look, missed
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn, scatter
@@ -53,9 +53,9 @@ def _pushed(c: Any, bodies: Any, t: float) -> bool:
     for b in range(bodies.size):
         body = bodies[b]
         person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
-        if person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width:
-            if c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and both_legs(body, c) > 0.0):
-                return True
+        near = person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
+        if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
+            return True
     return False
 
 

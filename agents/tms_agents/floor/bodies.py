@@ -19,8 +19,8 @@ STAND_M, _FAST, LONGEST_M = 0.045, 2.0, 1.4
 _FOOT_M = 0.05
 #: Wider than two feet side by side (m): a robot or furniture.
 WIDE_M = 0.4
-#: A foot last seen so long ago (s) has left.
-_SEEN_S = 0.25
+#: A foot last seen so long ago (s) has left; so long ago (s) is just now.
+_SEEN_S, _JUST_S = 0.25, 1.5
 #: Of whom two feet were seen at once in this share of so many scans is no robot.
 _TWO_FEET, _PERSON_HITS = 0.2, 80
 
@@ -249,7 +249,12 @@ def stuck(body: Any, t: float) -> tuple[float, float, float] | None:
     It may be what was put down, and the person has gone on.
     """
     a, b = t - body["a_seen"] < _SEEN_S, t - body["b_seen"] < _SEEN_S
-    if body["robot"] or a == b or body["stale"]:
+    if body["robot"] or body["stale"]:
+        return None
+    if a and b and body["a_print"] == body["b_print"] and t - body["a_since"] < _JUST_S and body["own_girth_n"] > 0:
+        # Both feet have just become one: it may be what stood between them.
+        return float(body["x"]), float(body["y"]), float(body["a_since"])
+    if a == b:
         return None
     if t - (body["a_since"] if a else body["b_since"]) < 0.8:
         return None

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 #: Of such a share of wide feet somebody's shoes are seen, not legs; so wide (m) is a shoe from its side.
 SHOES, _SHOE_M = 0.3, (0.16, 0.34)
+#: No shoe is so long (m).
+LONGEST_SHOE_M = 0.31
 #: Legs and shoes are measured while somebody walks faster than this (m/s): nothing else does.
 WALKS = 0.4
 #: Legs are expected as if so many had been seen; so many feet are remembered.

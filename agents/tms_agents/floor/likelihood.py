@@ -9,7 +9,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, together
-from tms_agents.floor.build import LEGS_KNOWN, SHOES, SHOES_KNOWN, WALKS, astray, from_side, sole
+from tms_agents.floor.build import (
+    LEGS_KNOWN,
+    LONGEST_SHOE_M,
+    SHOES,
+    SHOES_KNOWN,
+    WALKS,
+    astray,
+    from_side,
+    sole,
+    wears_shoes,
+)
 from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
 
@@ -38,10 +48,11 @@ _ROLL_M, _ROLLED_M = 0.08, 0.17
 #: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
 #: alike.
 _LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
-#: What is wider than a leg although the other one is elsewhere: as wide as two legs side by side (m), or wider.
-_PAIR_M, _PAIR, _NO_PAIR = 0.27, 2.0, 4.0
 #: The same of the length of a shoe; the sine of how far it points from the way.
 _SOLE_M, _TURNED = 0.015, 0.5
+#: Negative log likelihood of a foot wider than a leg although the other one is elsewhere: up to as wide as two legs
+#: side by side (m), and wider; or longer than a shoe.
+_PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
@@ -106,11 +117,13 @@ def _stouter(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
-def both_legs(body: Any, c: Any) -> float:
-    """Negative log likelihood of so wide a cluster, which may be both legs, if one of them is seen somewhere else."""
-    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.width <= _LEG_M:
+def too_wide(body: Any, c: Any) -> float:
+    """Negative log likelihood of one foot looking so wide: of a shoe, or of a leg, where two may be side by side."""
+    if body.shoe >= SHOES:
+        return _TOO_WIDE if wears_shoes(body) and c.width > LONGEST_SHOE_M else 0.0
+    if body.own_girth_n < LEGS_KNOWN or c.width <= _LEG_M:
         return 0.0
-    return _PAIR if c.width < _PAIR_M else _NO_PAIR
+    return _PAIR if c.width < _PAIR_M else _TOO_WIDE
 
 
 @njit(cache=True)
@@ -214,7 +227,7 @@ def costs(
             if c.attached:
                 shape += 4.0
             shape += _stouter(body, c) + _another_shoe(body, c)
-            broad = both_legs(body, c)
+            broad = too_wide(body, c)
             anywhere = (
                 _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
             )
@@ -285,9 +298,9 @@ def _beside(body: Any, bodies: Any, c: Any) -> bool:
     """Whether a mover that is believed is so near that its feet may be taken for another body: not what is broader."""
     for b in range(bodies.size):
         other = bodies[b]
-        if other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6:
-            if both_legs(other, c) == 0.0:
-                return True
+        near = other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6
+        if near and too_wide(other, c) == 0.0:
+            return True
     return False
 
 

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
-from tms_agents.floor.build import SHOES, wears_shoes
+from tms_agents.floor.build import LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
 from tms_agents.floor.prints import ALONE
 
@@ -39,8 +39,8 @@ _INERT_S = 30.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
-#: Two legs that are one thing to the laser are wider (m) than one; no shoe is so long (m).
-_LEGS_M, _LONG_SHOE_M = 0.2, 0.31
+#: Two legs that are one thing to the laser are wider (m) than one.
+_LEGS_M = 0.2
 #: What moved with people beside it for this share of its way may have been pushed.
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
@@ -68,7 +68,7 @@ _TELL_M = 0.05
 @njit(cache=True)
 def _is_lone(body: Any, t: float) -> bool:
     """Whether all that is seen of a person, unmoved for some time, may be a thing or two."""
-    no_shoe = wears_shoes(body) and body.width > _LONG_SHOE_M
+    no_shoe = wears_shoes(body) and body.width > LONGEST_SHOE_M
     if body.robot or body.wide > 0.6 or (body.width > _LEGS_M and not no_shoe):
         return False
     apart = np.hypot(body.ax - body.bx, body.ay - body.by)

@@ -307,7 +307,7 @@ class Tracks:
             if steps and since < _STEPS_S:
                 reach = max(reach, _STRIDE_M)
             for out_of_view, area in ((self._seated, self._seats), (self._masked, self._masks)):
-                if out_of_view(other):
+                if out_of_view(other) and not steps:
                     gap, reach = min(gap, area.distance(body["x0"], body["y0"]) + 0.05), 0.7
             if gap / reach < best_gap:
                 best, best_gap = other, gap / reach

@@ -36,7 +36,12 @@ def test_who_turns_up_again_has_his_name(absent: Absent) -> None:
 
 
 def test_who_is_lost_at_the_door_has_left(absent: Absent) -> None:
-    assert not absent.keep(person(0.8, 0.0))
+    assert not absent.keep(person(0.7, 0.0))
+
+
+def test_who_is_lost_beyond_reach_on_this_side_of_the_door_has_not_gone(absent: Absent) -> None:
+    assert absent.keep(person(1.2, 0.0, label=3))
+    assert absent.find(person(3.0, 0.0, first=13.0), expected())["label"] == 3
 
 
 def test_who_comes_in_at_the_door_is_somebody_new(absent: Absent) -> None:

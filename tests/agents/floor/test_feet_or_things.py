@@ -9,7 +9,7 @@ import pytest
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, FloorSettings, Scene
-from tms_agents.floor.likelihood import UNLIKELY, costs
+from tms_agents.floor.likelihood import UNLIKELY, costs, too_wide
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
@@ -127,3 +127,11 @@ def test_a_foot_as_wide_as_two_legs_is_none_if_the_other_leg_is_seen_somewhere_e
         costs(clusters, zero - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, zero, 10.0, cost)
         found.append(cost[0, 0])
     assert found[1] - found[0] == pytest.approx(dearer)
+
+
+@pytest.mark.parametrize(("length", "dearer"), [(0.29, 0.0), (0.35, 4.0)])
+def test_no_shoe_is_longer_than_any(length: float, dearer: float) -> None:
+    body, cluster = empty(BODY, 1)[0], np.zeros(1, CLUSTER)[0]
+    body["shoe"], body["own_sole"], body["own_sole_n"] = 1.0, 0.27, 50
+    cluster["width"] = length
+    assert too_wide(body, cluster) == dearer
