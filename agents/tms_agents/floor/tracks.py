@@ -197,8 +197,9 @@ class Tracks:
         body = self.bodies[index]
         if body["stale"]:
             return []
-        if self._seated(body):
-            # Who has sat down has not gone on the way he went.
+        walled = bool(self._region.polygons) and self._region.distance(float(body["x"]), float(body["y"])) > 0.0
+        if self._seated(body) or (walled and not self._leaves(body)):
+            # Who has sat down, or would have gone through a wall, has not gone on the way he went.
             foot = "a" if body["a_seen"] > body["b_seen"] else "b"
             body["x"], body["y"] = body[f"{foot}x"], body[f"{foot}y"]
         elif body["seen"] - body["rest_at"] < _RESTS_S and self._leaves(body):

@@ -12,11 +12,12 @@ from tms_agents.floor import Appeared, FloorSettings, Scene, Vanished
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
+from tms_agents.floor.events import Back, Stale
 from tms_agents.floor.freespace import vacant
 from tms_agents.floor.likelihood import costs
 from tms_agents.floor.masks import Masks
 from tms_agents.floor.missing import missed
-from tms_agents.floor.review import CONFIRM, NOTHING, review
+from tms_agents.floor.review import CONFIRM, GONE, NOTHING, review
 from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
 from tms_agents.floor.state import BODY, PRINT, empty
 from tms_agents.floor.tracks import Tracks
@@ -56,6 +57,39 @@ def test_who_walks_out_of_the_door_has_left_before_a_second_is_over(
     walker(one.bodies[0], 4.7, y, (1.0, 0.0), NOW - 0.7)
     events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
     assert [type(event) for event in events] == ([Vanished] if left else [])
+
+
+def test_who_is_hidden_does_not_go_on_through_a_wall() -> None:
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], 4.7, 3.0, (1.0, 0.0), NOW - 1.6)
+    (lost,) = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    assert isinstance(lost, Stale)
+    (label,) = one.labels(NOW)
+    assert label.stale
+    assert label.xy[0] == pytest.approx(4.7)
+
+
+@pytest.mark.parametrize(("steps", "feet", "gone"), [(0, 0, True), (0, 250, True), (5, 250, False)])
+def test_what_rests_and_never_took_a_step_is_a_thing(steps: int, feet: int, gone: bool) -> None:
+    """A bin that was pushed is as wide as two feet side by side, and has none."""
+    bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
+    walker(bodies[0], 3.0, 0.0, (0.0, 0.0), NOW)
+    bodies["own_pace_n"], bodies["both"], bodies["rest_at"], bodies["rest_x"] = steps, feet, NOW - 31.0, 3.0
+    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+    assert (actions[0] == GONE) == gone
+
+
+@pytest.mark.parametrize(("width", "his"), [(0.1, True), (0.37, False)], ids=["legs", "no feet"])
+def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, his: bool) -> None:
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], 3.0, 3.0, (0.0, 0.0), NOW - 2.0)
+    one.bodies["stale"][0] = 1
+    walker(one.bodies[1], 3.5, 3.0, (0.0, 0.0), NOW)
+    new = one.bodies[1]
+    new["confirmed"], new["own_pace_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0
+    new["first"], new["x0"], new["y0"], new["width"], new["far"] = NOW - 1.0, 3.1, 3.0, width, width
+    events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    assert [type(event) for event in events if event.label == (1 if his else 9)] == [Back if his else Appeared]
 
 
 def test_who_is_hidden_while_he_stands_in_the_door_has_not_left() -> None:
