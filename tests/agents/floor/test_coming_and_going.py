@@ -82,12 +82,12 @@ def test_what_rests_and_never_took_a_step_is_a_thing(steps: int, feet: int, gone
 @pytest.mark.parametrize(("width", "his"), [(0.1, True), (0.37, False)], ids=["legs", "no feet"])
 def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, his: bool) -> None:
     one = tracks([DOOR], ROOM)
-    walker(one.bodies[0], 3.0, 3.0, (0.0, 0.0), NOW - 2.0)
+    walker(one.bodies[0], 3.0, 1.0, (0.0, 0.0), NOW - 2.0)
     one.bodies["stale"][0] = 1
-    walker(one.bodies[1], 3.5, 3.0, (0.0, 0.0), NOW)
+    walker(one.bodies[1], 3.5, 1.0, (0.0, 0.0), NOW)
     new = one.bodies[1]
     new["confirmed"], new["own_pace_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0
-    new["first"], new["x0"], new["y0"], new["width"], new["far"] = NOW - 1.0, 3.1, 3.0, width, width
+    new["first"], new["x0"], new["y0"], new["width"], new["far"] = NOW - 1.0, 3.1, 1.0, width, width
     events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
     assert [type(event) for event in events if event.label == (1 if his else 9)] == [Back if his else Appeared]
 
