@@ -88,6 +88,7 @@ def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, h
     new = one.bodies[1]
     new["confirmed"], new["own_pace_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0
     new["first"], new["x0"], new["y0"], new["width"], new["far"] = NOW - 1.0, 3.1, 1.0, width, width
+    new["a_since"] = new["b_since"] = NOW - 0.3
     events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
     assert [type(event) for event in events if event.label == (1 if his else 9)] == [Back if his else Appeared]
 
