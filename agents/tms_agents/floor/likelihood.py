@@ -295,7 +295,9 @@ def costs(
 
 @njit(cache=True)
 def _beside(body: Any, bodies: Any, c: Any) -> bool:
-    """Whether a mover that is believed is so near that its feet may be taken for another body: not what is broader."""
+    """Whether a mover that is believed is so near that its feet may be taken for another body: not what it pushes."""
+    if body.from_furniture == 1:
+        return False
     for b in range(bodies.size):
         other = bodies[b]
         near = other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6

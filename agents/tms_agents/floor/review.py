@@ -124,7 +124,7 @@ def _is_parked(body: Any, t: float) -> bool:
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
         return bool(t - since > _PARKED_S)
-    if t - body.rest_at > _INERT_S and not body.robot and not has_walked(body):
+    if t - body.rest_at > _INERT_S and not body.robot and not has_walked(body) and not _is_known(body):
         return True
     if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
         # It came by itself.
@@ -255,8 +255,7 @@ def review(
                 actions[b] = LOST
             elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
                 # Somebody who is known for long has gone on from there.
-                inert = t - body.rest_at > _INERT_S
-                actions[b] = LOST if has_walked(body) or (_is_known(body) and not inert) else GONE
+                actions[b] = LOST if _is_known(body) or has_walked(body) else GONE
             elif body.stale:
                 actions[b] = BACK
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:

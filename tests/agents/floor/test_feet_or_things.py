@@ -9,7 +9,7 @@ import pytest
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, FloorSettings, Scene
-from tms_agents.floor.likelihood import UNLIKELY, costs, too_wide
+from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
@@ -135,3 +135,16 @@ def test_no_shoe_is_longer_than_any(length: float, dearer: float) -> None:
     body["shoe"], body["own_sole"], body["own_sole_n"] = 1.0, 0.27, 50
     cluster["width"] = length
     assert too_wide(body, cluster) == dearer
+
+
+@pytest.mark.parametrize(("pushed", "price"), [(1, 5.0), (0, 11.0)])
+def test_what_is_pushed_goes_on_beside_who_pushes_it(pushed: int, price: float) -> None:
+    """The feet of somebody else would not be so near."""
+    bodies, clusters = empty(BODY, 2), np.zeros(1, CLUSTER)
+    bodies["used"], bodies["seen"] = 1, 9.9
+    bodies["confirmed"], bodies["x"] = (1, 0), (0.4, 0.0)
+    bodies["from_furniture"] = (0, pushed)
+    clusters["width"] = 0.3
+    cost = np.full((1, 1), 11.0)
+    known(clusters, bodies, 10.0, cost)
+    assert cost[0, 0] == price
