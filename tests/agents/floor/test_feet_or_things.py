@@ -115,13 +115,13 @@ def test_a_foot_as_wide_as_two_legs_is_none_if_the_other_leg_is_seen_somewhere_e
 ) -> None:
     """Who pushes a bin walks on two legs beside it."""
     found = []
-    for known in (0, 400):
+    for seen in (0, 400):
         bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
         bodies["used"] = bodies["confirmed"] = 1
         bodies["hits"], bodies["looks"], bodies["seen"], bodies["pp"] = 100, 100, 9.9, 0.01
         bodies["ax"], bodies["a_seen"], bodies["a_print"] = 0.2, 9.9, -1
         bodies["bx"], bodies["b_seen"], bodies["b_print"] = (-0.2 if apart else 0.2), 9.9, -1
-        bodies["own_girth"], bodies["own_girth_n"] = 0.11, known
+        bodies["own_girth"], bodies["own_girth_n"] = 0.11, seen
         clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.2, 20, width, 0.01
         cost, zero = np.zeros((1, 3)), np.zeros(1, np.int64)
         costs(clusters, zero - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, zero, 10.0, cost)
