@@ -12,7 +12,7 @@ from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
-from tms_agents.floor.missing import look, missed
+from tms_agents.floor.missing import expect, missed
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
@@ -278,7 +278,7 @@ def _advance(
         _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t)
         _complete(bodies, clusters, of, marks, free, blank, prints, t)
         unseen = missed(bodies, rows[:k], t, sight)
-        look(bodies, t, sight)
+        expect(bodies, t, sight)
         known_already = False
         score = child_score[o] - least + unseen
         for j in range(kept):

@@ -93,7 +93,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.x, body.y, body.vx, body.vy = c.x, c.y, 0.0, 0.0
     body.pp, body.pv, body.vv = 0.04, 0.0, 0.8
     body.at, body.first, body.seen = t, t, t
-    body.hits, body.looks, body.both = 1, 0, 0
+    body.hits, body.looks, body.due, body.both = 1, 1, 0, 0
     body.x0, body.y0 = c.x, c.y
     body.width = c.width
     body.wide = 1.0 if c.width > WIDE_M else 0.0
@@ -175,6 +175,7 @@ def update(
         foot(body, d, d_late, d_print, prints, t)
         swap(body)
         body.score += footlike(d)
+    body.looks += 1
     if not has_c and not has_d:
         return
     body.hits += 1

@@ -41,7 +41,7 @@ _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
 #: Of saved states; 6: how wide the legs are of whoever has a name.
-_FORMAT = 7
+_FORMAT = 8
 
 
 class FloorEstimator:

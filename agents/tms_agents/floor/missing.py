@@ -35,8 +35,8 @@ def missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
 
 
 @njit(cache=True)
-def look(bodies: Any, t: float, sight: Any) -> None:
-    """Count for all who are not believed yet in how many scans they were seen or should have been."""
+def expect(bodies: Any, t: float, sight: Any) -> None:
+    """Count for all who are not believed yet in how many scans they were seen or should have been (due)."""
     ranges, states, longest, pose, first, step = sight
     for b in range(bodies.size):
         body = bodies[b]
@@ -47,7 +47,7 @@ def look(bodies: Any, t: float, sight: Any) -> None:
             turned = np.arctan2(body.y - pose[1], body.x - pose[0]) - pose[2]
             if view in (HIDDEN, WALLED) or np.isnan(beam_of(turned, first, step, ranges.size)):
                 continue
-        body.looks += 1
+        body.due += 1
 
 
 @njit(cache=True)

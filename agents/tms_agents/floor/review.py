@@ -223,7 +223,7 @@ def review(
             if body.wide > 0.5:
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
-            steady = body.hits >= max(_HITS, _STEADY * body.looks)
+            steady = body.hits >= max(_HITS, _STEADY * body.due)
             if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, 0.45 * body.hits):
                 came = _has_come(body, t, ranges, longest, pose, first, step)
                 actions[b] = CONFIRM if came and not _is_put(bodies, b, t) else NOTHING

@@ -62,7 +62,8 @@ PRINT = np.dtype(
 #: how likely that name is. Further: for how long (s) and where it has stood on one foot alone (lone), for how long what
 #: it stands on had been nobody's before (older, s), where and since when it has stayed (rest), how wide the legs are
 #: (m, 0: unknown), whether what is seen of it is no foot, and why (odd, `prints.UNLIKE`), and the line on which the
-#: shoe last seen from its side lay (ex, ey), and when (e_at).
+#: shoe last seen from its side lay (ex, ey), and when (e_at). Of one not believed yet: in how many scans it was seen
+#: (hits), could have been (looks), and was or should have been (due).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -83,6 +84,7 @@ BODY = np.dtype(
         ("seen", "f8"),
         ("hits", "i8"),
         ("looks", "i8"),
+        ("due", "i8"),
         ("both", "i8"),
         ("x0", "f8"),
         ("y0", "f8"),
