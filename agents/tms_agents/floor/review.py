@@ -28,6 +28,8 @@ _OLDER_S, _FASTER = 1.0, 2.5
 #: Not even who has come step by step stands for so long (s) without shifting a foot, nor for so long with one shoe
 #: behind the other, if shoes are all that is seen.
 _STILL_S, _SHOD_S = 900.0, 60.0
+#: Who has come from so far (m), two feet of whom were seen at once so often, is somebody, too.
+_CAME_M, _CAME_BOTH = 0.5, 10
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
@@ -49,8 +51,9 @@ _REST_M = 0.15
 _QUALITY = 0.3
 #: Who was seen so often is somebody.
 _KNOWN = 200
-#: Who has taken so many steps, two feet of whom were seen so often, is a person.
-_STEPS, _BOTH = 3, 30
+#: Who has taken so many steps, two legs of whom were seen at once so often, or two shoes, is a person: who walks has
+#: both shoes on the floor for a tenth of the time only.
+_STEPS, _BOTH_LEGS, _BOTH_SHOES = 3, 30, 6
 #: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
 _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
 #: Who is believed was seen so often, and in this share of the scans that should have shown him.
@@ -77,7 +80,8 @@ def _is_lone(body: Any, t: float) -> bool:
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
-    if has_walked(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
+    came = np.hypot(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH
+    if (has_walked(body) or came) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
@@ -89,7 +93,8 @@ def _is_lone(body: Any, t: float) -> bool:
 @njit(cache=True)
 def has_walked(body: Any) -> bool:
     """Whether it has come on two feet, step by step."""
-    return bool(body.own_pace_n >= _STEPS and body.both >= _BOTH)
+    least = _BOTH_SHOES if body.shoe >= SHOES or wears_shoes(body) else _BOTH_LEGS
+    return bool(body.own_pace_n >= _STEPS and body.both >= least)
 
 
 @njit(cache=True)
