@@ -119,6 +119,25 @@ def test_nobody_left_a_foot_further_behind_than_a_stride(other_x: float, lost: b
     assert (LOST in found(standing(2.0, other_x), 14.0, COVERED)) == lost
 
 
+@pytest.mark.parametrize(
+    ("paces", "both", "way", "shoe", "lost"),
+    [
+        (5, 8, 0.0, 1.0, False),  # who walks has both shoes on the floor now and then only
+        (5, 8, 0.0, 0.0, True),  # both legs are seen all the time
+        (0, 20, 1.0, 0.0, False),  # too few steps to count, but he came from somewhere on two feet
+        (0, 20, 0.2, 0.0, True),  # two things may be seen at once where they are
+        (0, 4, 1.0, 0.0, True),  # what was pushed came from somewhere, too
+    ],
+)
+def test_who_came_on_two_feet_may_stand_with_one_behind_the_other(
+    paces: int, both: int, way: float, shoe: float, lost: bool
+) -> None:
+    bodies = standing(2.0, 2.1, shoe=shoe)
+    bodies["own_pace_n"], bodies["both"] = paces, both
+    bodies["x0"], bodies["rest_x"] = 2.0 + way, 2.0
+    assert (LOST in found(bodies, 14.0)) == lost
+
+
 @pytest.mark.parametrize(("shoe", "seconds", "lost"), [(1.0, 50.0, False), (1.0, 80.0, True), (0.0, 80.0, False)])
 def test_one_shoe_does_not_hide_behind_the_other_for_long(shoe: float, seconds: float, lost: bool) -> None:
     assert (LOST in found(standing(2.0, 2.2, shoe=shoe), seconds)) == lost
