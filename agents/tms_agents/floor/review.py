@@ -31,7 +31,7 @@ _STILL_S, _SHOD_S = 900.0, 60.0
 #: Who has come from so far (m), two feet of whom were seen at once so often, is somebody, too.
 _CAME_M, _CAME_BOTH = 0.5, 10
 #: Whose other foot was last seen so near (m) stands on both.
-_STANCE_M = 0.5
+_STANCE_M = 0.4
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
 _STOOD_S = 20.0
 #: What was pushed stands still for so long (s): it is furniture.
