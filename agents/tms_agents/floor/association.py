@@ -12,7 +12,7 @@ from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
-from tms_agents.floor.missing import expect, missed
+from tms_agents.floor.missing import expect, missed, out_of_reach
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
@@ -81,6 +81,7 @@ def _apply(
     blank: Any,
     prints: Any,
     t: float,
+    sight: Any,
 ) -> None:
     """Update the bodies ``rows`` (k,) with the clusters (m,) whose ``columns`` (m,) are their feet."""
     k = rows.size
@@ -96,8 +97,11 @@ def _apply(
                 learn(bodies[rows[column]], marks[i, 0], marks[i, 1])
         one = clusters[a] if a >= 0 else blank[0]
         two = clusters[b] if b >= 0 else blank[0]
+        body = bodies[rows[column]]
+        leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)
+        x, y, vx, vy, pp, pv, vv = body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv
         update(
-            bodies[rows[column]],
+            body,
             one,
             a >= 0,
             of[a] if a >= 0 else -1,
@@ -106,10 +110,12 @@ def _apply(
             b >= 0,
             of[b] if b >= 0 else -1,
             marks[b, 2] if b >= 0 else 0.0,
-            (a < 0) != (b < 0) and together(bodies[rows[column]], clusters, max(a, b), t),
+            (a < 0) != (b < 0) and together(body, clusters, max(a, b), t),
             prints,
             t,
         )
+        if leaves:
+            body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv = x, y, vx, vy, pp, pv, vv
 
 
 @njit(cache=True)
@@ -122,6 +128,7 @@ def _complete(
     blank: Any,
     prints: Any,
     t: float,
+    sight: Any,
 ) -> None:
     """What the believed movers have left goes to those not yet believed, and then begins new ones."""
     m = clusters.size
@@ -134,7 +141,7 @@ def _complete(
             cost = np.empty((m, 2 * k + m))
             costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
             assign(cost, columns)
-        _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t)
+        _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
     for i in range(m):
         c = clusters[i]
         if (
@@ -275,8 +282,8 @@ def _advance(
         _copy(parent, beliefs[child_parent[o]], bodies, spare_beliefs[kept])
         k = _rows(bodies, 1, rows)
         free = np.ones(m, np.bool_)
-        _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t)
-        _complete(bodies, clusters, of, marks, free, blank, prints, t)
+        _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t, sight)
+        _complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
         unseen = missed(bodies, rows[:k], t, sight)
         expect(bodies, t, sight)
         known_already = False

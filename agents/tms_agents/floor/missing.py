@@ -8,12 +8,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.freespace import FREE, HIDDEN, WALLED, beam_of, clear
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, beam_of, clear
 
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
 #: And of missing one leg of somebody who walks (m/s) for so long (s), seen so often, in this share on both legs.
 _LIMP, _WALKS, _UP_S, _SEEN, _MOSTLY = 0.8, 0.4, 0.6, 20, 0.6
+
+#: The foot that swings is so far (m) ahead of who goes so fast (m/s), and was seen so long (s) ago.
+_AHEAD_M, _LEAVES, _SWINGS_S = 0.3, 0.5, 0.6
 
 
 @njit(cache=True)
@@ -48,6 +51,23 @@ def expect(bodies: Any, t: float, sight: Any) -> None:
             if view in (HIDDEN, WALLED) or np.isnan(beam_of(turned, first, step, ranges.size)):
                 continue
         body.due += 1
+
+
+@njit(cache=True)
+def out_of_reach(body: Any, c: Any, t: float, sight: Any) -> bool:
+    """Whether the cluster is a foot that somebody leaves behind who walks to where the laser does not reach.
+
+    Then where his other foot is tells, not that he waits for it.
+    """
+    speed = np.hypot(body.vx, body.vy)
+    if body.robot or speed < _LEAVES or t - min(body.a_seen, body.b_seen) > _SWINGS_S:
+        return False
+    if (c.x - body.x) * body.vx + (c.y - body.y) * body.vy > 0.0:
+        return False
+    ranges, states, longest, pose, first, step = sight
+    ahead = _AHEAD_M / speed
+    x, y = body.x + ahead * body.vx, body.y + ahead * body.vy
+    return clear(x, y, 0.05, ranges, states, longest, pose, first, step) == UNSEEN
 
 
 @njit(cache=True)

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from floor_rooms import Room
+from floor_rooms import Room, sweep
+from floor_rooms import walker as legs_of
 
-from tms_agents.floor import Appeared, FloorSettings, Scene, Vanished
+from tms_agents.floor import Appeared, FloorEstimator, FloorSettings, Scene, Sensor, Vanished
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
@@ -228,3 +229,21 @@ def test_who_is_hidden_in_every_other_scan_is_somebody() -> None:
 
     _, events = Room(slats).play(14.0)
     assert [event for event in events if isinstance(event, Appeared) and event.kind == "mover"]
+
+
+@pytest.mark.parametrize("stride_s", [0.45, 0.5, 0.55])
+def test_who_walks_out_of_reach_goes_on_at_his_pace(stride_s: float) -> None:
+    """Of his last steps the foot that he leaves behind is seen, not the one that swings ahead: he does not wait."""
+    way = [(9.0, 0.9, 1.0), (11.4, 0.9, 1.0), (13.1, 2.77, 2.5)]
+    sensor = Sensor(sweep(271, reach=2.7), (0.05, 0.05, math.pi / 4))
+    off: list[float] = []
+
+    def look(t: float, estimator: FloorEstimator) -> None:
+        feet = legs_of(way, stride_s=stride_s)(t)
+        x, y = np.mean([foot[:2] for foot in feet], axis=0) if feet else (math.nan, math.nan)
+        if t > 11.4 and math.hypot(x - 0.05, y - 0.05) > 2.7:
+            off.append(min((math.dist((x, y), one.xy) for one in estimator.labels()), default=math.inf))
+
+    Room(legs_of(way, stride_s=stride_s), sensors={"A": sensor}).play(13.0, each=look)
+    assert len(off) > 3
+    assert max(off) < 0.45
