@@ -219,6 +219,9 @@ class Gripper:
         put = Transfer(seq=0, observed_at=now, from_=held.label, to=thing.label, kind=kind, **place, **_given(cov=cov))
         self.held = None
         self._told(now)
+        # Two hands may have read the same tag, one of them a neighbour's: the last one put down is taken to bear it.
+        for one in [one for one in self.table.things.values() if one.tag is not None and one.tag == thing.tag]:
+            self.table.things[one.label] = one.model_copy(update={"tag": None})
         self.table.things[thing.label] = thing
         return [put, *self._gone(now, list(self.table.things.values())[:-_MOST_PUT_DOWN])]
 

@@ -173,6 +173,20 @@ def test_no_state_is_refused(hand):
         hand.restore({"held": 5})
 
 
+def test_a_tag_that_two_hands_read_is_where_it_was_put_down_last():
+    """Both things lie there; a grasp of the tag takes the second, and of the first nobody knows what it is."""
+    numbers, table = itertools.count(1), Table()
+    one, other = (Gripper(lambda: f"hand/{next(numbers)}", table=table) for _ in range(2))
+    one.grasped(at(0), (0, 0), tag=TEA)
+    other.grasped(at(1), (1, 0), tag=TEA)
+    (first,) = one.released(at(2), (0, 1))
+    (second,) = other.released(at(3), (2, 1))
+    assert {thing.label: thing.tag for thing in table.things.values()} == {first.to: None, second.to: TEA}
+    vanished, _ = one.grasped(at(4), (2, 1), tag=TEA)
+    assert vanished.label == second.to
+    assert list(table.things) == [first.to]
+
+
 XY = st.tuples(st.sampled_from([0.0, 0.05, 1.0, 2.0]), st.sampled_from([0.0, 1.0]))
 TAGS = st.sampled_from([None, "A1", "B2", "C3"])
 ACTION = st.one_of(
