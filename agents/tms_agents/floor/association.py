@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, predict, together, update
+from tms_agents.floor.build import agree
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
 from tms_agents.floor.missing import expect, missed, out_of_reach
@@ -19,9 +20,8 @@ from tms_agents.floor.state import BODY, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
-#: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and than its parent's best.
-_KEPT, _WORSE, _BRANCH = 12, 14.0, 7.0
-_CHILDREN = 48
+#: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and its parent's; new ones.
+_KEPT, _WORSE, _BRANCH, _CHILDREN = 12, 14.0, 7.0, 48
 #: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
 _NEAR_M, _ALIKE = 0.08, 0.3
 #: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
@@ -348,6 +348,10 @@ class Association:
         )
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return taken
+
+    def agree(self, shoes: Array) -> None:
+        """All show one kind of feet, once it is known which; ``shoes`` (2,) is what `build.count_shoes` learns."""
+        agree(self._hypotheses[: self._count], shoes)
 
     def decide(self) -> None:
         """From now on only the best hypothesis counts."""

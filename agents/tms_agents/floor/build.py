@@ -34,6 +34,9 @@ SURE = 0.6
 #: most; of recorded ones, far from a coarse laser that joins both, up to 0.37. Of somebody alone (`shoe`) it is
 #: unlearned while he seems to stand on a narrow thing.
 SHOD = 0.2
+#: Where so many feet were seen, and at most or at least such a share was as wide as a shoe, all show the same: legs, or
+#: shoes, also those who stand and point at the laser.
+_PLENTY, _ALL_LEGS, _ALL_SHOES = 150.0, 0.1, 0.45
 #: The toes and the heel of a shoe are that wide, as a share of its length (`sole`); both are in view if it looks so
 #: wide (m), and it points along the way (sine of the angle).
 _TOES, _SIDE_M, _ASTRAY = 0.3, 0.19, 0.5
@@ -126,3 +129,13 @@ def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, sho
             if of[i] >= 0 and not c.cut and (body.a_print == of[i] or body.b_print == of[i]):
                 shoes[1] = min(shoes[1] + 1.0, _LONG)
                 shoes[0] += ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - shoes[0]) / shoes[1]
+
+
+def agree(bodies: Any, shoes: NDArray[np.float64]) -> None:
+    """Let all ``bodies`` show what is known to be seen, shoes or legs; ``shoes`` (2,) is what `count_shoes` learns."""
+    if shoes[1] < _PLENTY:
+        return
+    if shoes[0] > _ALL_SHOES:
+        np.maximum(bodies["shoe"], SHOES, out=bodies["shoe"])
+    elif shoes[0] < _ALL_LEGS:
+        np.minimum(bodies["shoe"], 0.5 * SHOES, out=bodies["shoe"])

@@ -138,6 +138,7 @@ class FloorEstimator:
         somebodys = np.zeros(clusters.size, np.bool_)
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
         count_shoes(bodies, clusters[:feet], of[:feet], t, self._shoes)
+        self._association.agree(self._shoes)
         if recognize(bodies, *self._robots):
             self._association.decide()
         attend(prints, bodies, t, dt, self._association.scattered, self._shoes)

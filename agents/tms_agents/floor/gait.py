@@ -16,10 +16,10 @@ from tms_agents.floor.build import SHOES, beat, from_side
 
 #: A foot that moved by so much (m) since the last scan swings; a stance elsewhere than the last (m) is another one.
 _SWING_M, _STANCE_M = 0.05, 0.12
-#: A shoe seems to move so far (m) when it rolls off.
-_ROLL_M = 0.17
-#: Who walks has put down the other shoe after this (s).
-_STEP_S = 0.65
+#: A shoe seems to move so far (m) when it rolls off, at most; what was on the floor so lately (s) has not landed anew.
+_ROLL_M, _ROLLS_M, _UP_S = 0.17, 0.3, 0.25
+#: Who walks has put down the other shoe after this (s); who has not, stops.
+_STEP_S, _STOPS_S = 0.5, 0.55
 NOTHING = (0.0, 0.0, np.inf, 0.0, 0.0, np.inf)
 
 
@@ -64,7 +64,9 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
         body.ex, body.ey, body.e_at = c.ex, c.ey, t
     if swings:
         return
-    elsewhere = _ROLL_M if body.shoe >= SHOES else _STANCE_M
+    elsewhere = _STANCE_M
+    if body.shoe >= SHOES:
+        elsewhere = _ROLL_M if t - body.a_stood > _UP_S else _ROLLS_M
     anew = np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0
     if anew and not stays:
         beat(body, body.a_stood - body.a_land, since - body.a_stood)
@@ -120,13 +122,15 @@ def _astride(body: Any, t: float) -> tuple[float, float, float, float, float, fl
     else:
         qx, qy, px, py, ox, oy, age = body.b_px, body.b_py, body.a_px, body.a_py, body.b_ox, body.b_oy, t - body.b_land
     dx, dy = qx - px, qy - py
-    if age < 0.3:
-        share = -0.32 + 1.1 * age if body.shoe >= SHOES else -0.4 + 0.8 * age
+    shoes = body.shoe >= SHOES
+    if age < (0.25 if shoes else 0.3):
+        share = -0.32 + 1.1 * age if shoes else -0.4 + 0.8 * age
         noise = 0.08 + 0.2 * age
         vx, vy, slow = _going(body, dx, dy, qx - ox, qy - oy, t)
         return qx + share * dx, qy + share * dy, noise * noise, vx, vy, slow
     noise = max(0.05, 0.17 - 0.1 * (age - 0.3))
-    return qx - 0.5 * dx, qy - 0.5 * dy, noise * noise, 0.0, 0.0, 0.4**2
+    share = -0.3 if shoes and age < 0.45 else -0.5
+    return qx + share * dx, qy + share * dy, noise * noise, 0.0, 0.0, 0.4**2
 
 
 @njit(cache=True)
@@ -168,13 +172,14 @@ def _alone(body: Any, t: float) -> tuple[float, float, float, float, float, floa
         return body.ax, body.ay, 0.1**2, 0.0, 0.0, np.inf
     if body.a_land < body.b_land:
         # The other had landed later and is up again: this one may be a foot that waits.
-        return body.a_px - 0.3 * dx, body.a_py - 0.3 * dy, 0.18**2, 0.0, 0.0, np.inf
-    if body.shoe >= SHOES:
-        share = min(-0.3 + 1.1 * age, 0.33) if age < _STEP_S else 0.15
-    else:
-        share = min(-0.36 + 1.05 * age, 0.15)
-    noise = 0.08 + 0.3 * age
+        back = 0.12 if body.shoe >= SHOES else 0.3
+        return body.a_px - back * dx, body.a_py - back * dy, 0.18**2, 0.0, 0.0, np.inf
+    share, noise = min(-0.36 + 1.05 * age, 0.15), 0.08 + 0.3 * age
     vx, vy, slow = 0.0, 0.0, np.inf
+    if body.shoe >= SHOES:
+        share = min(-0.33 + age, 0.02) if age < _STEP_S else -0.1
+        if age > _STOPS_S:
+            noise, slow = 0.2, 0.5**2
     if age < 0.4:
         vx, vy, slow = _going(body, dx, dy, body.a_px - body.a_ox, body.a_py - body.a_oy, t)
         slow *= 1.0 + 4.0 * age

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tms_agents.floor import Sensor
 from tms_agents.floor.background import BACKGROUND, FOREGROUND
-from tms_agents.floor.build import SHOD, astray, count_shoes, from_side, legs, size_up, sole
+from tms_agents.floor.build import SHOD, SHOES, agree, astray, count_shoes, from_side, legs, size_up, sole
 from tms_agents.floor.gait import middle
 from tms_agents.floor.rays import rays
 from tms_agents.floor.segmentation import CLUSTER, Segmenter
@@ -132,3 +132,16 @@ def test_who_has_just_put_down_a_shoe_goes_where_it_points(backwards: bool) -> N
     assert before[4] == 0.0
     assert math.atan2(after[4], after[3]) == pytest.approx(math.radians(15.0), abs=math.radians(6.0))
     assert after[5] < before[5]
+
+
+@pytest.mark.parametrize(
+    ("share", "seen", "kind"), [(0.6, 500, "shoes"), (0.01, 500, "legs"), (0.3, 500, "either"), (0.6, 100, "either")]
+)
+def test_all_show_what_is_known_to_be_seen(share: float, seen: int, kind: str) -> None:
+    bodies = empty(BODY, (2, 2))
+    bodies["shoe"] = [[0.05, 0.8], [0.5, 0.0]]
+    agree(bodies, np.array([share, seen]))
+    shod = (bodies["shoe"] >= SHOES).tolist()
+    assert (
+        shod == {"shoes": [[True] * 2] * 2, "legs": [[False] * 2] * 2, "either": [[False, True], [True, False]]}[kind]
+    )

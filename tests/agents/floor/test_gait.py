@@ -55,5 +55,62 @@ def test_a_foot_that_swings_tells_where_the_body_goes() -> None:
     assert np.isfinite(variance)
 
 
+def shod(x: float, y: float):
+    body = walker(x, y)
+    body["shoe"] = 1.0
+    return body
+
+
+def strides(body, t: float = 1.0) -> float:
+    """From standing the second foot lands 0.7 m ahead after 0.5 s: when that is."""
+    for k in range(int(10 * t)):
+        see(body, (1.0, 1.0), (1.0, 1.2), k / 10)
+    for k in range(4):
+        see_one(body, (1.0, 1.0), t + k / 10)
+    t += 0.4
+    see(body, (1.0, 1.0), (1.7, 1.2), t)
+    return t
+
+
+def see_one(body, xy, t: float) -> None:
+    prints = empty(PRINT, 8)
+    prints["first"] = t
+    foot(body, cluster(*xy), 0.0, -1, prints, t)
+
+
+@pytest.mark.parametrize("rolled", [0.05, 0.14, 0.19, 0.25])
+def test_a_shoe_that_rolls_off_has_not_landed_anew(rolled: float) -> None:
+    body = shod(1.0, 1.0)
+    t = strides(body)
+    see(body, (1.0 + rolled, 1.0), (1.7, 1.2), t + 0.1)
+    assert body["a_land"] < body["b_land"]
+    assert middle(body, t + 0.1)[0] > 1.4
+
+
+def test_a_shoe_that_was_up_and_is_seen_elsewhere_has_landed() -> None:
+    body = shod(1.0, 1.0)
+    t = strides(body)
+    for k in range(1, 5):
+        swap(body)
+        see_one(body, (1.7, 1.2), t + k / 10)
+        swap(body)
+    see(body, (1.25, 1.0), (1.7, 1.2), t + 0.5)
+    assert body["a_land"] == t + 0.5
+
+
+def test_who_does_not_put_down_the_other_shoe_stops() -> None:
+    body = shod(1.0, 1.0)
+    t = strides(body)
+    ahead = []
+    for k in range(1, 9):
+        swap(body)
+        see_one(body, (1.7, 1.2), t + k / 10)
+        swap(body)
+        ahead.append(middle(body, t + k / 10))
+    going, late = ahead[3], ahead[-1]
+    assert going[0] > 1.65 > late[0] > 1.5
+    assert late[3] == 0.0 and np.isfinite(late[5])
+
+
 def test_nothing_seen_tells_nothing() -> None:
     assert np.isinf(middle(walker(1.0, 1.0), 5.0)[2])
