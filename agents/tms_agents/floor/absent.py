@@ -1,4 +1,4 @@
-"""People whose place is seen to be empty but who cannot have left: far from every door nobody goes and nobody comes."""
+"""People who are not seen and may be there: far from every door nobody goes, and in a door some turn round."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ _DOOR_M, _GONE_M = 1.0, 0.3
 _SOMEBODY = 30
 #: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s).
 _AWAY_M, _SPEED, _WAIT_S = 1.0, 1.0, 20.0
+#: Who was seen last so far (m) on this side of the threshold may have turned round; then he is seen again within this
+#: (s), and believed so long (s) after that at most.
+_THRESHOLD_M, _TURNS_S, _BELIEVED_S = 0.25, 6.0, 1.5
 #: So near (m) where he was lost he may stand, since so long (s) before that at most.
 _STEPS_M, _JUST_S = 1.2, 4.0
 #: Who looks and walks as unlikely as this (log likelihood) is somebody else.
@@ -28,43 +31,74 @@ _UNLIKE = -6.0
 
 
 class Absent:
-    """``gates``: the doors. Where they are not known, people may come and go anywhere, and nobody is waited for."""
+    """``gates``: the doors of ``region``. Where none is known people may come and go anywhere: nobody is waited for."""
 
-    def __init__(self, gates: Area) -> None:
-        self._gates = gates
+    def __init__(self, gates: Area, region: Area) -> None:
+        self._gates, self._region = gates, region
         self._bodies: list[Any] = []
+        self._turning: list[Any] = []
 
     def keep(self, body: Any) -> bool:
         """Whether this one, of whom nothing is seen any more, must be somewhere: then he is waited for."""
         inside = math.inf > self._gates.distance(float(body["x"]), float(body["y"])) > _GONE_M
+        return inside and self._wait(self._bodies, body)
+
+    def turns(self, body: Any) -> bool:
+        """Whether this one, who seems to have gone out by a door, may have turned round in it: then he is waited for.
+
+        Whoever goes out is seen last on the threshold.
+        """
+        if not self._gates.polygons:
+            return False
+        foot = "a" if body["a_seen"] > body["b_seen"] else "b"
+        x, y = float(body[f"{foot}x"]), float(body[f"{foot}y"])
+        if self._region.depth(x, y) < _THRESHOLD_M or not self._wait(self._turning, body):
+            return False
+        self._turning[-1]["x"], self._turning[-1]["y"] = x, y
+        return True
+
+    @staticmethod
+    def _wait(lost: list[Any], body: Any) -> bool:
         somebody = body["hits"] >= _SOMEBODY and not body["robot"] and body["wide"] < 0.3
-        if inside and somebody:
-            self._bodies.append(body.copy())
-            self._bodies[-1]["stale"] = 1
-        return bool(inside and somebody)
+        if somebody:
+            lost.append(body.copy())
+            lost[-1]["stale"] = 1
+        return bool(somebody)
 
     def save(self) -> dict[str, Any]:
         """JSON values."""
-        return pack(np.array(self._bodies, BODY))
+        return {
+            "waiting": pack(np.array(self._bodies, BODY)),
+            "turning": pack(np.array(self._turning, BODY)),
+        }
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
-        self._bodies = list(unpack(saved, empty(BODY, int(saved["shape"][0]))))
+        waiting, turning = (saved[name] for name in ("waiting", "turning"))
+        self._bodies = list(unpack(waiting, empty(BODY, int(waiting["shape"][0]))))
+        self._turning = list(unpack(turning, empty(BODY, int(turning["shape"][0]))))
 
     def find(self, body: Any, scattered: Array) -> Any:
         """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `alike` takes."""
-        x, y = float(body["x0"]), float(body["y0"])
-        if not self._bodies or body["wide"] > 0.3 or self._gates.distance(x, y) < _DOOR_M:
+        if body["wide"] > 0.3:
             return None
+        found = self._nearest(self._turning, body, scattered, _TURNS_S)
+        if found is None and self._gates.distance(float(body["x0"]), float(body["y0"])) >= _DOOR_M:
+            found = self._nearest(self._bodies, body, scattered, _WAIT_S)
+        return found
+
+    @staticmethod
+    def _nearest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> Any:
+        """Take out of those ``lost`` the one that the body most probably is, or None."""
         best, best_cost = None, 1.0
-        for index, one in enumerate(self._bodies):
+        for index, one in enumerate(lost):
             since = max(0.0, float(body["first"]) - float(one["seen"]))
-            gap = math.hypot(x - float(one["x"]), y - float(one["y"])) / (_AWAY_M + _SPEED * since)
+            gap = math.hypot(body["x0"] - one["x"], body["y0"] - one["y"]) / (_AWAY_M + _SPEED * since)
             likely = float(alike(body, one, scattered))
             cost = 0.5 * gap + 0.5 * likely / _UNLIKE
-            if gap < 1.0 and likely > _UNLIKE and cost < best_cost:
+            if since < within_s and gap < 1.0 and likely > _UNLIKE and cost < best_cost:
                 best, best_cost = index, cost
-        return None if best is None else self._bodies.pop(best)
+        return None if best is None else lost.pop(best)
 
     def stands(self, print_: Any) -> bool:
         """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost."""
@@ -76,6 +110,9 @@ class Absent:
 
     def gone(self, t: float) -> list[FloorEvent]:
         """Those who did not turn up."""
-        late = [one for one in self._bodies if t - one["seen"] > _WAIT_S]
-        self._bodies = [one for one in self._bodies if t - one["seen"] <= _WAIT_S]
-        return [Vanished(t, int(one["label"]), float(one["seen"]), t) for one in late]
+        events: list[FloorEvent] = []
+        for lost, wait_s in ((self._bodies, _WAIT_S), (self._turning, _TURNS_S + _BELIEVED_S)):
+            late = [one for one in lost if t - one["seen"] > wait_s]
+            events += [Vanished(t, int(one["label"]), float(one["seen"]), t) for one in late]
+            lost[:] = [one for one in lost if t - one["seen"] <= wait_s]
+        return events

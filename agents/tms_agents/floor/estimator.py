@@ -40,8 +40,8 @@ _WAITS_S, _STOPS_S = 25.0, 8.0
 _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
-#: Of saved states; 6: how wide the legs are of whoever has a name.
-_FORMAT = 8
+#: Of saved states; 9: who may have turned round in a door.
+_FORMAT = 9
 
 
 class FloorEstimator:

@@ -32,8 +32,12 @@ def inside(polygon: Array, x: float, y: float) -> bool:
 @njit(cache=True)
 def distance(polygon: Array, x: float, y: float) -> float:
     """How far (x, y) is from the polygon (n, 2), m; 0 inside."""
-    if inside(polygon, x, y):
-        return 0.0
+    return 0.0 if inside(polygon, x, y) else border(polygon, x, y)
+
+
+@njit(cache=True)
+def border(polygon: Array, x: float, y: float) -> float:
+    """How far (x, y) is from the outline of the polygon (n, 2), m."""
     n = polygon.shape[0]
     best = np.inf
     for i in range(n):
@@ -89,6 +93,11 @@ class Area:
     def distance(self, x: float, y: float) -> float:
         """How far (x, y) is from the nearest polygon, m; inf where there is none."""
         return min((float(distance(polygon, x, y)) for polygon in self.polygons), default=np.inf)
+
+    def depth(self, x: float, y: float) -> float:
+        """How far (x, y) is inside, from the outline of a polygon, m; 0 outside of all."""
+        within = (polygon for polygon in self.polygons if inside(polygon, x, y))
+        return max((float(border(polygon, x, y)) for polygon in within), default=0.0)
 
 
 class Masks:

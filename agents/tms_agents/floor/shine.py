@@ -18,8 +18,8 @@ _FALL = 0.287
 _PATCHES, _BEAM, _PEOPLE = 0.12, 0.15, 0.4
 #: What is known of somebody never counts as better than this many sightings; the least that tell anything.
 _MEMORY, _LEAST = 40, 4
-#: So many sightings make somebody's own look.
-_LIFE = 1200
+#: So many sightings make how somebody looks of late, by which an exchange of names is noticed, and his own look.
+_LATELY, _LIFE = 20, 1200
 #: Scans of one foot resemble each other: each tells so much only, more where shoes are even, since what is left then
 #: is the noise of beams, new in every scan; and nothing tells more than so many deviations.
 _SHARE, _EVEN, _FAR = 0.5, 0.35, 3.5
@@ -116,7 +116,7 @@ def learn(body: Any, value: float, variance: float) -> None:
         return
     body.shine_n = min(body.shine_n + 1, _MEMORY)
     body.shine += (value - body.shine) / body.shine_n
-    body.look_n = min(body.look_n + 1, 3 * _MEMORY)
+    body.look_n = min(body.look_n + 1, _LATELY)
     body.look += (value - body.look) / body.look_n
     if body.sure >= SURE:
         body.own_n = min(body.own_n + 1, _LIFE)

@@ -56,7 +56,7 @@ class Tracks:
         self._seats, self._masks, self._gates = Area(scene.seats), Area(scene.masks), Area(scene.gates)
         self._region = Area([] if scene.region is None else [scene.region])
         self._robots = [tuple(sorted(size)) for size in scene.robots]
-        self.absent = Absent(self._gates)
+        self.absent = Absent(self._gates, self._region)
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._actions = np.zeros(self.bodies.size, np.int64)
@@ -163,7 +163,7 @@ class Tracks:
             body["clear"] = 0.0
             return self._lost(index, t)
         self._association.forget(index)
-        if body["clear"] > self._settings.leave_s and self.absent.keep(body):
+        if (body["clear"] > self._settings.leave_s and self.absent.keep(body)) or self.absent.turns(body):
             return [] if body["stale"] else [Stale(t, int(body["label"]))]
         return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
 
@@ -204,7 +204,8 @@ class Tracks:
             body["x"], body["y"] = body[f"{foot}x"], body[f"{foot}y"]
         elif body["seen"] - body["rest_at"] < _RESTS_S and self._leaves(body):
             self._association.forget(index)
-            return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
+            left = not self.absent.turns(body)
+            return [Vanished(t, int(body["label"]), float(body["seen"]), t) if left else Stale(t, int(body["label"]))]
         if body["seen"] == t:
             # What is seen is something else.
             self._association.decide()

@@ -12,6 +12,7 @@ from tms_agents.floor.masks import Area
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, empty
 
+ROOM = [(0.0, -2.0), (9.0, -2.0), (9.0, 6.0), (0.0, 6.0)]
 DOOR = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
 
 
@@ -26,7 +27,7 @@ def person(x: float, y: float, *, label: int = 1, seen: float = 10.0, first: flo
 
 @pytest.fixture
 def absent() -> Absent:
-    return Absent(Area([DOOR]))
+    return Absent(Area([DOOR]), Area([ROOM]))
 
 
 def test_who_turns_up_again_has_his_name(absent: Absent) -> None:
@@ -49,8 +50,31 @@ def test_who_comes_in_at_the_door_is_somebody_new(absent: Absent) -> None:
     assert absent.find(person(0.8, 0.0, first=12.0), expected()) is None
 
 
+@pytest.mark.parametrize(
+    ("inside_m", "turned", "own", "same"),
+    [
+        (0.4, 12.0, 7.0, True),
+        (0.4, 17.0, 7.0, False),
+        (0.4, 12.0, 5.0, False),
+        (0.1, 12.0, 7.0, False),
+        (-0.3, 12.0, 7.0, False),
+    ],
+    ids=["at once", "later", "another", "from the threshold", "from outside"],
+)
+def test_who_turns_round_in_the_door_keeps_his_name(
+    absent: Absent, inside_m: float, turned: float, own: float, same: bool
+) -> None:
+    one = person(-0.4, 0.0, label=3)
+    one["ax"], one["ay"], one["a_seen"], one["b_seen"] = inside_m, 0.0, 10.0, 9.0
+    assert absent.turns(one) == (inside_m > 0.25)
+    found = absent.find(person(0.6, 0.2, first=turned, own=own), expected())
+    assert (found is not None and found["label"] == 3) == same
+
+
 def test_without_doors_people_may_leave_anywhere() -> None:
-    assert not Absent(Area([])).keep(person(4.0, 4.0))
+    open_plan = Absent(Area([]), Area([ROOM]))
+    assert not open_plan.keep(person(4.0, 4.0))
+    assert not open_plan.turns(person(4.0, 4.0))
 
 
 def test_a_glimpse_is_nobody(absent: Absent) -> None:
@@ -82,8 +106,12 @@ def test_who_does_not_turn_up_has_left(absent: Absent) -> None:
 def test_who_is_waited_for_is_so_after_a_restart(absent: Absent) -> None:
     absent.keep(person(4.0, 4.0, label=5))
     absent.keep(person(7.0, 4.0, label=6))
-    again = Absent(Area([DOOR]))
+    turning = person(0.0, 0.0, label=7)
+    turning["ax"], turning["a_seen"], turning["b_seen"] = 0.4, 10.0, 9.0
+    absent.turns(turning)
+    again = Absent(Area([DOOR]), Area([ROOM]))
     again.restore(json.loads(json.dumps(absent.save())))
+    assert again.gone(19.0) == [Vanished(19.0, 7, 10.0, 19.0)]
     assert again.find(person(4.5, 4.0, first=12.0), expected())["label"] == 5
     assert again.gone(31.0) == [Vanished(31.0, 6, 10.0, 31.0)]
 

@@ -35,6 +35,11 @@ def tracks(gates: list[list[tuple[float, float]]], region: list[tuple[float, flo
     return Tracks(Association(2), FloorSettings(), Scene(region=region, gates=gates))
 
 
+def at(one: Tracks, t: float) -> list:
+    """What happens at t, where nothing is seen."""
+    return one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+
+
 def walker(body: np.ndarray, x: float, y: float, v: tuple[float, float], seen: float) -> None:
     """Somebody believed who was seen last at (x, y) and has gone on at v since."""
     body["used"] = body["confirmed"] = body["label"] = 1
@@ -55,15 +60,26 @@ def test_who_walks_out_of_the_door_has_left_before_a_second_is_over(
     y: float, region: list[tuple[float, float]] | None, left: bool
 ) -> None:
     one = tracks([DOOR], region)
-    walker(one.bodies[0], 4.7, y, (1.0, 0.0), NOW - 0.7)
-    events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    walker(one.bodies[0], 4.9, y, (1.0, 0.0), NOW - 0.7)
+    events = at(one, NOW)
     assert [type(event) for event in events] == ([Vanished] if left else [])
+
+
+def test_who_was_last_seen_on_this_side_of_the_threshold_may_turn_round_in_the_door_and_has_left_if_he_does_not() -> (
+    None
+):
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], 4.6, 1.5, (1.0, 0.0), NOW - 0.7)
+    told = [(t, event) for t in NOW + np.arange(0.0, 9.0, 0.1) for event in at(one, t)]
+    assert [type(event) for _, event in told] == [Stale, Vanished]
+    assert told[0][0] == NOW
+    assert 5.0 < told[1][0] - NOW < 8.0 and told[1][1].earliest == NOW - 0.7
 
 
 def test_who_is_hidden_does_not_go_on_through_a_wall() -> None:
     one = tracks([DOOR], ROOM)
     walker(one.bodies[0], 4.7, 3.0, (1.0, 0.0), NOW - 1.6)
-    (lost,) = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    (lost,) = at(one, NOW)
     assert isinstance(lost, Stale)
     (label,) = one.labels(NOW)
     assert label.stale
@@ -90,7 +106,7 @@ def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, h
     new["confirmed"], new["own_pace_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0
     new["first"], new["x0"], new["y0"], new["width"], new["far"] = NOW - 1.0, 3.1, 1.0, width, width
     new["a_since"] = new["b_since"] = NOW - 0.3
-    events = one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    events = at(one, NOW)
     assert [type(event) for event in events if event.label == (1 if his else 9)] == [Back if his else Appeared]
 
 
@@ -98,7 +114,7 @@ def test_who_is_hidden_while_he_stands_in_the_door_has_not_left() -> None:
     one = tracks([DOOR], ROOM)
     walker(one.bodies[0], 5.1, 1.5, (0.0, 0.0), NOW - 0.7)
     one.bodies["rest_at"] = NOW - 10.0
-    assert one.review(NOW, 0.1, OPEN, lambda: 9, lambda body: False, learned=True) == []
+    assert at(one, NOW) == []
 
 
 def test_where_the_door_is_feet_count_a_little_outside_too() -> None:
