@@ -20,6 +20,7 @@ from tms_agents.floor.build import (
     sole,
     wears_shoes,
 )
+from tms_agents.floor.landing import landing
 from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
 
@@ -70,21 +71,11 @@ def _apart(dx: float, dy: float, body: Any, speed: float, along: float, aside: f
 
 
 @njit(cache=True)
-def _landing(dx: float, dy: float, c: Any, body: Any, speed: float, side: float) -> float:
-    """The same of a foot landing (dx, dy) from the other: a stride ahead and on its own side."""
+def _strides_on(dx: float, dy: float, body: Any, speed: float, side: float) -> float:
+    """The same of a leg put (dx, dy) from the other: a stride ahead and on its own side."""
     ux, uy = body.vx / speed, body.vy / speed
-    behind, along, across, rare = 0.0, 0.15, 0.1, 2.4
-    if body.shoe >= SHOES:
-        if from_side(c):
-            # The shoe points where he is going now.
-            sign = 1.0 if ux * c.ex + uy * c.ey > 0.0 else -1.0
-            ux, uy = sign * c.ex, sign * c.ey
-            behind, along, across, rare = 0.0, 0.13, 0.12, 2.44
-        else:
-            # Of a shoe the heel is seen first.
-            behind, along, across, rare = 0.15, 0.2, 0.17, 3.2
-    ahead, aside = dx * ux + dy * uy - body.stride + behind, dy * ux - dx * uy - side
-    return float(0.5 * (ahead**2 / (along**2 + 0.2 * body.pp) + aside**2 / (across**2 + 0.2 * body.pp)) + rare)
+    ahead, aside = dx * ux + dy * uy - body.stride, dy * ux - dx * uy - side
+    return float(0.5 * (ahead**2 / (0.15**2 + 0.2 * body.pp) + aside**2 / (0.1**2 + 0.2 * body.pp)) + 2.4)
 
 
 @njit(cache=True)
@@ -238,10 +229,12 @@ def costs(
                 if which == 0:
                     x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
                     ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
+                    landed = body.b_land
                     left = t - body.a_since > _LEFT_S and t - body.b_since < _FRESH_S
                 else:
                     x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
                     ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
+                    landed = body.a_land
                     left = t - body.b_since > _LEFT_S and t - body.a_since < _FRESH_S
                 gap = t - seen
                 off = (c.x - x) ** 2 + (c.y - y) ** 2
@@ -261,7 +254,9 @@ def costs(
                 if broad > 0.0 and t - other < 0.2 and np.hypot(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
                     value += broad
                 step = anywhere
-                if gap < 0.22 and not left:
+                if body.shoe >= SHOES and not left:
+                    step = landing(body, c, ox, oy, seen, landed, t - age)
+                elif gap < 0.22 and not left:
                     # Seen just now, it cannot be far, unless it was something that was left behind.
                     step += _SEEN + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / 0.1) ** 2
                 elif left:
@@ -277,9 +272,9 @@ def costs(
                     value = min(value, step + 2.5)
                 else:
                     value = min(value, step)
-                    if speed > 0.35 and gap < 1.3 and t - other < 0.4:
+                    if body.shoe < SHOES and speed > 0.35 and gap < 1.3 and t - other < 0.4:
                         side = body.side if which == 0 else -body.side
-                        value = min(value, _landing(c.x - ox, c.y - oy, c, body, speed, side) + step - anywhere)
+                        value = min(value, _strides_on(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
                 cost[i, 2 * column + which] = shape + value
     # Both feet in one cluster: whatever else is near is not a foot of this body.
     for column in range(k):
