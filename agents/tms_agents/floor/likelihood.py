@@ -254,16 +254,16 @@ def costs(
                 if broad > 0.0 and t - other < 0.2 and np.hypot(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
                     value += broad
                 step = anywhere
-                if body.shoe >= SHOES and not left:
+                if body.shoe >= SHOES:
                     step = landing(body, c, ox, oy, seen, landed, t - age)
                 elif gap < 0.22 and not left:
                     # Seen just now, it cannot be far, unless it was something that was left behind.
                     step += _SEEN + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / 0.1) ** 2
-                elif left:
-                    step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
-                elif gap > 1.0:
+                elif gap > 1.0 and not left:
                     # It must be somewhere.
                     step -= 1.0
+                if left:
+                    step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
                 if age > gap + 0.15 and not lately:
                     # Whatever stands here came while this foot was somewhere else.
                     step += _STOLEN
