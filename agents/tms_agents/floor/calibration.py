@@ -59,7 +59,7 @@ def fit_walls(points: Array, outline: Sequence[tuple[float, float]], start: Pose
         _descend(spaced, walls, np.array([start[0] + dx, start[1] + dy, start[2] + turn]))
         for dx, dy, turn in itertools.product(_SHIFTS_M, _SHIFTS_M, _TURNS)
     ]
-    best = max(fits, key=lambda pose: (round(_share(spaced, walls, pose), 2), -float(np.hypot(*(pose - start)[:2]))))
+    best = max(fits, key=lambda pose: (*_fits(spaced, walls, pose), -float(np.hypot(*(pose - start)[:2]))))
     gap, jacobian = _residuals(points, walls, best)
     near = np.abs(gap) < MATCHED_M
     if near.sum() < 20:
@@ -128,8 +128,12 @@ def _descend(points: Array, walls: _Walls, pose: NDArray[np.float64]) -> NDArray
     return pose
 
 
-def _share(points: Array, walls: _Walls, pose: NDArray[np.float64]) -> float:
-    return float(np.mean(np.abs(_residuals(points, walls, pose)[0]) < MATCHED_M))
+def _fits(points: Array, walls: _Walls, pose: NDArray[np.float64]) -> tuple[float, float]:
+    """The share of points at a wall, in hundredths, and minus how far they are off, in whole millimetres."""
+    gap = _residuals(points, walls, pose)[0]
+    near = np.abs(gap) < MATCHED_M
+    off = float(np.sqrt(np.mean(gap[near] ** 2))) if near.any() else MATCHED_M
+    return round(float(near.mean()), 2), -round(off, 3)
 
 
 def _spaced(points: Array, step_m: float = 0.03) -> Array:

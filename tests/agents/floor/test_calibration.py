@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from floor_rig import DEPTH, OUTLINE, WIDTH, Room, sweep
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor.calibration import fit_walls, static_points
@@ -33,6 +33,8 @@ def looked(room, pose, scans=20, beams=SWEEP):
     off=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)),
     seed=st.integers(0, 100),
 )
+# As many points at a wall as at the right pose, but a centimetre off, and nearer to where the search began.
+@example(x=2.6158185640823244, y=1.5, theta=2.4837689694309746, off=(0.0, 0.078125, 0.22735308527274883), seed=77)
 def test_walls_tell_the_pose_whatever_stands_before_them(x, y, theta, off, seed):
     room, random = Room(seed), np.random.default_rng(seed)
     for n in range(6):  # furniture
