@@ -20,7 +20,7 @@ _SWING_M, _STANCE_M = 0.05, 0.12
 _ROLL_M, _ROLLS_M, _UP_S = 0.17, 0.3, 0.25
 #: Who walks has put down the other shoe after this (s); who has not, stops.
 _STEP_S, _STOPS_S = 0.5, 0.55
-#: Nobody stands with his feet farther apart (m): the older one is a thing he has left.
+#: Nobody stands with his shoes farther apart (m): the older one is a thing he has left.
 _ASTRIDE_M = 0.8
 #: Nor does he lift the one that is so far ahead (m) while the other has stood for so long (s).
 _BEHIND_M, _LONG_S = 0.6, 1.0
@@ -132,7 +132,7 @@ def _astride(body: Any, t: float) -> tuple[float, float, float, float, float, fl
         noise = 0.08 + 0.2 * age
         vx, vy, slow = _going(body, dx, dy, qx - ox, qy - oy, t)
         return qx + share * dx, qy + share * dy, noise * noise, vx, vy, slow
-    if np.hypot(dx, dy) > _ASTRIDE_M:
+    if shoes and np.hypot(dx, dy) > _ASTRIDE_M:
         return qx, qy, 0.15**2, 0.0, 0.0, np.inf
     noise = max(0.05, 0.17 - 0.1 * (age - 0.3))
     share = -0.3 if shoes and age < 0.45 else -0.5
@@ -177,7 +177,7 @@ def _alone(body: Any, t: float) -> tuple[float, float, float, float, float, floa
         # Both legs may be one thing to the laser: it goes as the body goes.
         return body.ax, body.ay, 0.1**2, 0.0, 0.0, np.inf
     if body.a_land < body.b_land:
-        if np.hypot(dx, dy) > _BEHIND_M and age > _LONG_S:
+        if body.shoe >= SHOES and np.hypot(dx, dy) > _BEHIND_M and age > _LONG_S:
             return body.x, body.y, np.inf, 0.0, 0.0, np.inf
         # The other had landed later and is up again: this one may be a foot that waits.
         back = 0.12 if body.shoe >= SHOES else 0.3
