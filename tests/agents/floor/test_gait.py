@@ -72,6 +72,16 @@ def strides(body, t: float = 1.0) -> float:
     return t
 
 
+def leaves_one_foot(step: float, seconds: float):
+    """Who stands on one foot for 1.5 s, and has stood on the other one, so far (m) ahead, for some seconds, too."""
+    body = shod(1.0, 1.0)
+    for k in range(15):
+        see_one(body, (1.0, 1.0), k / 10)
+    for k in range(15, 15 + round(10 * seconds)):
+        see(body, (1.0, 1.0), (1.0 + step, 1.0), k / 10)
+    return body
+
+
 def see_one(body, xy, t: float) -> None:
     prints = empty(PRINT, 8)
     prints["first"] = t
@@ -114,21 +124,13 @@ def test_who_does_not_put_down_the_other_shoe_stops() -> None:
 
 @pytest.mark.parametrize(("step", "over"), [(0.7, 1.35), (1.0, 2.0)])
 def test_who_steps_farther_than_anybody_stands_has_left_a_thing_behind(step: float, over: float) -> None:
-    body = shod(1.0, 1.0)
-    for k in range(15):
-        see_one(body, (1.0, 1.0), k / 10)
-    for k in range(15, 22):
-        see(body, (1.0, 1.0), (1.0 + step, 1.0), k / 10)
+    body = leaves_one_foot(step, seconds=0.7)
     assert middle(body, 2.1)[0] == pytest.approx(over, abs=0.05)
 
 
 @pytest.mark.parametrize(("step", "stays"), [(0.4, True), (0.9, False)])
 def test_who_lifts_the_foot_that_is_ahead_does_not_come_back_to_what_he_has_left(step: float, stays: bool) -> None:
-    body = shod(1.0, 1.0)
-    for k in range(15):
-        see_one(body, (1.0, 1.0), k / 10)
-    for k in range(15, 18):
-        see(body, (1.0, 1.0), (1.0 + step, 1.0), k / 10)
+    body = leaves_one_foot(step, seconds=0.3)
     for k in range(18, 21):
         see_one(body, (1.0, 1.0), k / 10)
     assert np.isfinite(middle(body, 2.0)[2]) == stays
