@@ -8,14 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.adopting import BLANK, adopt, chosen
 from tms_agents.floor.assignment import assign
-from tms_agents.floor.bodies import begin, narrow, predict, together, update
+from tms_agents.floor.bodies import predict
 from tms_agents.floor.build import agree
 from tms_agents.floor.identity import christen, renamed, unite
-from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
-from tms_agents.floor.missing import expect, missed, out_of_reach
-from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.shine import expected, learn, scatter
+from tms_agents.floor.likelihood import UNLIKELY, costs, known
+from tms_agents.floor.shine import expected, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
 
 Array = NDArray[np.float64]
@@ -24,140 +23,9 @@ Array = NDArray[np.float64]
 _KEPT, _WORSE, _BRANCH, _CHILDREN = 12, 14.0, 7.0, 48
 #: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
 _NEAR_M, _ALIKE = 0.08, 0.3
-#: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
-_FRESH_S = 0.4
-#: No foot is wider (m); no leg, of who is known to show legs.
-_BROAD_M, _BROAD_LEGS_M = 0.28, 0.2
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
 OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
 NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
-_BLANK = np.zeros(1, CLUSTER)
-
-
-@njit(cache=True)
-def _crowded(c: Any, bodies: Any) -> bool:
-    """Whether somebody's foot is so near that this is hardly another body."""
-    for b in range(bodies.size):
-        body = bodies[b]
-        if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
-            return True
-        # Legs that are one thing to the laser fall apart now and then.
-        if body.used and body.confirmed and np.hypot(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
-            return True
-    return False
-
-
-@njit(cache=True)
-def _pushed(c: Any, bodies: Any, t: float) -> bool:
-    """Whether what begins is too wide for a foot and a person stands beside it."""
-    for b in range(bodies.size):
-        body = bodies[b]
-        person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
-        near = person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
-        if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
-            return True
-    return False
-
-
-@njit(cache=True)
-def _rows(bodies: Any, confirmed: int, rows: NDArray[np.int64]) -> int:
-    count = 0
-    for b in range(bodies.size):
-        if bodies[b].used and bodies[b].confirmed == confirmed:
-            rows[count] = b
-            count += 1
-    return count
-
-
-@njit(cache=True)
-def _apply(
-    bodies: Any,
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    blank: Any,
-    prints: Any,
-    t: float,
-    sight: Any,
-) -> None:
-    """Update the bodies ``rows`` (k,) with the clusters (m,) whose ``columns`` (m,) are their feet."""
-    k = rows.size
-    feet = np.full(2 * k, -1)
-    for i in range(clusters.size):
-        if free[i] and 0 <= columns[i] < 2 * k:
-            feet[columns[i]] = i
-            free[i] = False
-    for column in range(k):
-        a, b = feet[2 * column], feet[2 * column + 1]
-        for i in (a, b):
-            if i >= 0 and not clusters[i].cut:
-                learn(bodies[rows[column]], marks[i, 0], marks[i, 1])
-        one = clusters[a] if a >= 0 else blank[0]
-        two = clusters[b] if b >= 0 else blank[0]
-        body = bodies[rows[column]]
-        leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)
-        x, y, vx, vy, pp, pv, vv = body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv
-        update(
-            body,
-            one,
-            a >= 0,
-            of[a] if a >= 0 else -1,
-            marks[a, 2] if a >= 0 else 0.0,
-            two,
-            b >= 0,
-            of[b] if b >= 0 else -1,
-            marks[b, 2] if b >= 0 else 0.0,
-            (a < 0) != (b < 0) and together(body, clusters, max(a, b), t),
-            prints,
-            t,
-        )
-        if leaves:
-            body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv = x, y, vx, vy, pp, pv, vv
-
-
-@njit(cache=True)
-def _complete(
-    bodies: Any,
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    blank: Any,
-    prints: Any,
-    t: float,
-    sight: Any,
-) -> None:
-    """What the believed movers have left goes to those not yet believed, and then begins new ones."""
-    m = clusters.size
-    scratch = np.empty(bodies.size, np.int64)
-    k = _rows(bodies, 0, scratch)
-    rows = scratch[:k]
-    if k:
-        columns = np.full(m, -1)
-        if m:
-            cost = np.empty((m, 2 * k + m))
-            costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
-            assign(cost, columns)
-        _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
-    for i in range(m):
-        c = clusters[i]
-        if (
-            not free[i]
-            or narrow(c)
-            or c.attached
-            or (of[i] >= 0 and t - prints[of[i]].first > _FRESH_S)
-            or _crowded(c, bodies)
-        ):
-            continue
-        for b in range(bodies.size):
-            if not bodies[b].used:
-                begin(bodies[b], c, of[i], t)
-                if _pushed(c, bodies, t):
-                    bodies[b].from_furniture = 1
-                break
 
 
 @njit(cache=True)
@@ -235,7 +103,7 @@ def _advance(
     for h in range(count):
         bodies = hypotheses[h]
         predict(bodies, t)
-        k = _rows(bodies, 1, rows)
+        k = chosen(bodies, 1, rows)
         if m == 0 or k == 0:
             if children < _CHILDREN:
                 child_score[children], child_parent[children] = scores[h], h
@@ -270,7 +138,7 @@ def _advance(
                 child_columns[children] = other
                 children += 1
     other_of, scratch = np.empty(n, np.int64), np.empty((2, n))
-    owned = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_)
+    owned, free = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_), np.ones(m, np.bool_)
     order = np.argsort(child_score[:children])
     kept = 0
     least = child_score[order[0]]
@@ -280,12 +148,8 @@ def _advance(
         bodies = spare[kept]
         parent = hypotheses[child_parent[o]]
         _copy(parent, beliefs[child_parent[o]], bodies, spare_beliefs[kept])
-        k = _rows(bodies, 1, rows)
-        free = np.ones(m, np.bool_)
-        _apply(bodies, rows[:k], child_columns[o], clusters, of, marks, free, blank, prints, t, sight)
-        _complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
-        unseen = missed(bodies, rows[:k], t, sight)
-        expect(bodies, t, sight)
+        k = chosen(bodies, 1, rows)
+        unseen = adopt(bodies, rows[:k], child_columns[o], clusters, of, marks, blank, prints, t, sight, free)
         known_already = False
         score = child_score[o] - least + unseen
         for j in range(kept):
@@ -340,7 +204,7 @@ class Association:
             of,
             marks,
             self.scattered,
-            _BLANK,
+            BLANK,
             prints,
             t,
             sight,

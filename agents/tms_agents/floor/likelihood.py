@@ -57,6 +57,9 @@ _PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
+#: One that is part of a foot that something hides the middle of: so many beams lie between both parts at least; at
+#: most if something dark did not echo there, and if something is before it.
+_PART, _FEW, _FADED, _HIDDEN = 2.0, 2, 4, 40
 
 
 @njit(cache=True)
@@ -131,6 +134,23 @@ def _another_shoe(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
+def _part(clusters: Any, i: int, longest: float) -> bool:
+    """Whether cluster i may be the smaller part of a foot, ``longest`` m at most, whose middle something hides."""
+    c = clusters[i]
+    for o in range(clusters.size):
+        p = clusters[o]
+        if o == i or p.mirror != c.mirror or p.width < c.width or (p.width == c.width and o > i):
+            continue
+        between = max(c.first - p.last, p.first - c.last) - 1
+        if not _FEW <= between <= _HIDDEN:
+            continue
+        hidden = c.cut != 0 and p.cut != 0
+        if (hidden or between <= _FADED) and np.hypot(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width) < longest:
+            return True
+    return False
+
+
+@njit(cache=True)
 def waits(body: Any, c: Any) -> bool:
     """Whether the cluster is where a foot of the body stood when it was lost sight of."""
     if not body.stale or body.robot or max(body.a_seen, body.b_seen) < 0.0:
@@ -164,6 +184,9 @@ def costs(
     one is somebody new, which is rare; an old one may well be something that was put down.
     """
     m, k = clusters.size, rows.size
+    shod = False
+    for column in range(k):
+        shod = shod or bodies[rows[column]].shoe >= SHOES
     for i in range(m):
         c = clusters[i]
         cost[i, :] = UNLIKELY
@@ -180,6 +203,8 @@ def costs(
                 stands = stands or part
             if not stands:
                 cost[i, 2 * k + i] = _RESTS
+        if _part(clusters, i, LONGEST_SHOE_M if shod else _LEG_M):
+            cost[i, 2 * k + i] = min(cost[i, 2 * k + i], _PART)
         if not free[i]:
             continue
         for column in range(k):

@@ -15,18 +15,22 @@ from tms_agents.simulation.floor_world.gait import FeetKind
 from tms_agents.simulation.floor_world.lasers import FINE, Laser, Mount
 from tms_agents.simulation.floor_world.life import Life
 from tms_agents.simulation.floor_world.scenarios import ROBOT_SIZE, SCENARIOS
-from tms_agents.simulation.floor_world.shapes import Floats, Xy, box_corners
+from tms_agents.simulation.floor_world.shapes import Floats, Ints, Xy, box_corners
 from tms_agents.simulation.floor_world.truth import Witness
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One scan: ``t`` s of its first beam as its sensor says, ``ranges`` and ``intensities`` (n,)."""
+    """One scan: ``t`` s of its first beam as its sensor says, ``ranges`` and ``intensities`` (n,).
+
+    ``owners`` (n,) is whose each beam has met (`room.owner`; -1: nobody's), for who judges an estimator.
+    """
 
     sensor: str
     t: float
     ranges: Floats
     intensities: Floats
+    owners: Ints
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -93,7 +97,7 @@ class FloorWorld:
             measured, _ = self.room.look(name, t)
             stamp = max(0.0, t + errors.jitter())
             self._witness.saw(name, stamp, measured)
-            yield Frame(name, stamp, measured.ranges, measured.intensities)
+            yield Frame(name, stamp, measured.ranges, measured.intensities, measured.owners)
             due[name] = t + errors.period()
 
     def truth(self) -> dict[str, Any]:

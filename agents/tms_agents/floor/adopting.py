@@ -1,0 +1,178 @@
+"""What follows when it is decided whose feet the clusters of a scan are: bodies move, and new ones begin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.assignment import assign
+from tms_agents.floor.bodies import begin, narrow, together, update
+from tms_agents.floor.likelihood import costs, too_wide
+from tms_agents.floor.missing import expect, missed, out_of_reach
+from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.shine import learn
+
+Array = NDArray[np.float64]
+
+#: A new body begins only at a print younger than this (s): what has stood there for long does not begin to walk.
+_FRESH_S = 0.4
+#: No foot is wider (m); no leg, of who is known to show legs.
+_BROAD_M, _BROAD_LEGS_M = 0.28, 0.2
+#: No cluster.
+BLANK = np.zeros(1, CLUSTER)
+
+
+@njit(cache=True)
+def _crowded(c: Any, bodies: Any) -> bool:
+    """Whether somebody's foot is so near that this is hardly another body."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
+            return True
+        # Legs that are one thing to the laser fall apart now and then.
+        if body.used and body.confirmed and np.hypot(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _pushed(c: Any, bodies: Any, t: float) -> bool:
+    """Whether what begins is too wide for a foot and a person stands beside it."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
+        near = person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
+        if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
+            return True
+    return False
+
+
+@njit(cache=True)
+def chosen(bodies: Any, confirmed: int, rows: NDArray[np.int64]) -> int:
+    """Fill ``rows`` (n,) with the bodies that are ``confirmed`` (1) or not yet (0): how many there are."""
+    count = 0
+    for b in range(bodies.size):
+        if bodies[b].used and bodies[b].confirmed == confirmed:
+            rows[count] = b
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _apply(
+    bodies: Any,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    blank: Any,
+    prints: Any,
+    t: float,
+    sight: Any,
+) -> None:
+    """Update the bodies ``rows`` (k,) with the clusters (m,) whose ``columns`` (m,) are their feet."""
+    k = rows.size
+    feet = np.full(2 * k, -1)
+    for i in range(clusters.size):
+        if free[i] and 0 <= columns[i] < 2 * k:
+            feet[columns[i]] = i
+            free[i] = False
+    for column in range(k):
+        a, b = feet[2 * column], feet[2 * column + 1]
+        for i in (a, b):
+            if i >= 0 and not clusters[i].cut:
+                learn(bodies[rows[column]], marks[i, 0], marks[i, 1])
+        one = clusters[a] if a >= 0 else blank[0]
+        two = clusters[b] if b >= 0 else blank[0]
+        body = bodies[rows[column]]
+        leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)
+        x, y, vx, vy, pp, pv, vv = body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv
+        update(
+            body,
+            one,
+            a >= 0,
+            of[a] if a >= 0 else -1,
+            marks[a, 2] if a >= 0 else 0.0,
+            two,
+            b >= 0,
+            of[b] if b >= 0 else -1,
+            marks[b, 2] if b >= 0 else 0.0,
+            (a < 0) != (b < 0) and together(body, clusters, max(a, b), t),
+            prints,
+            t,
+        )
+        if leaves:
+            body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv = x, y, vx, vy, pp, pv, vv
+
+
+@njit(cache=True)
+def _complete(
+    bodies: Any,
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    blank: Any,
+    prints: Any,
+    t: float,
+    sight: Any,
+) -> None:
+    """What the believed movers have left goes to those not yet believed, and then begins new ones."""
+    m = clusters.size
+    scratch = np.empty(bodies.size, np.int64)
+    k = chosen(bodies, 0, scratch)
+    rows = scratch[:k]
+    if k:
+        columns = np.full(m, -1)
+        if m:
+            cost = np.empty((m, 2 * k + m))
+            costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
+            assign(cost, columns)
+        _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
+    for i in range(m):
+        c = clusters[i]
+        if (
+            not free[i]
+            or narrow(c)
+            or c.attached
+            or (of[i] >= 0 and t - prints[of[i]].first > _FRESH_S)
+            or _crowded(c, bodies)
+        ):
+            continue
+        for b in range(bodies.size):
+            if not bodies[b].used:
+                begin(bodies[b], c, of[i], t)
+                if _pushed(c, bodies, t):
+                    bodies[b].from_furniture = 1
+                break
+
+
+@njit(cache=True)
+def adopt(
+    bodies: Any,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    blank: Any,
+    prints: Any,
+    t: float,
+    sight: Any,
+    free: NDArray[np.bool_],
+) -> float:
+    """Let the clusters (m,) be the feet that ``columns`` (m,) says of the movers ``rows`` (k,): 2i and 2i + 1 of row i.
+
+    ``free`` (m,) becomes which of them are nobody's. The negative log likelihood of not having seen those in view.
+    """
+    free[:] = True
+    _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
+    _complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
+    unseen = missed(bodies, rows, t, sight)
+    expect(bodies, t, sight)
+    return float(unseen)
