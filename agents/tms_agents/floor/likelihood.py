@@ -254,12 +254,12 @@ def costs(
                 if which == 0:
                     x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
                     ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
-                    landed = body.b_land
+                    landed, beside = body.b_land, body.b_print
                     left = t - body.a_since > _LEFT_S and t - body.b_since < _FRESH_S
                 else:
                     x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
                     ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
-                    landed = body.a_land
+                    landed, beside = body.a_land, body.a_print
                     left = t - body.b_since > _LEFT_S and t - body.a_since < _FRESH_S
                 gap = t - seen
                 off = (c.x - x) ** 2 + (c.y - y) ** 2
@@ -289,7 +289,7 @@ def costs(
                     step -= 1.0
                 if left:
                     step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
-                if age > gap + 0.15 and not lately:
+                if age > gap + 0.15 and (not lately or (body.shoe >= SHOES and beside == of[i])):
                     # Whatever stands here came while this foot was somewhere else.
                     step += _STOLEN
                 if age >= _FRESH_S and q.owner != rows[column] and not lately:

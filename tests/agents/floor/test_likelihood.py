@@ -68,3 +68,38 @@ def test_two_feet_are_two_feet(two) -> None:
 def test_no_leg_is_as_long_as_a_shoe() -> None:
     assert min(of_nobody(parts(0.18, (0.1, 0.06), 12, BEHIND_SOMETHING_NEW), shoes=False)) > 10.0
     assert min(of_nobody(parts(0.08, (0.06, 0.05), 3, FADES), shoes=False)) < 5.0
+
+
+def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ago() -> None:
+    t, rested = 10.0, 1.7
+    bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
+    # She goes on; one foot was seen just now, the other is taken to stand far behind, where she was long ago.
+    body = bodies[0]
+    body["used"] = body["confirmed"] = body["shoe"] = 1
+    body["at"], body["x"], body["vx"], body["pp"], body["stride"] = t, 1.2, 0.9, 0.02, 0.6
+    body["ax"], body["a_seen"], body["a_print"], body["a_land"] = 1.0, t - 0.1, -1, t - 0.6
+    body["bx"], body["b_seen"], body["b_print"], body["b_land"], body["b_since"] = (
+        0.1,
+        t - 0.1,
+        0,
+        t - rested,
+        t - rested,
+    )
+    print_ = prints[0]
+    print_["used"], print_["x"], print_["first"], print_["rested"], print_["last"] = 1, 0.1, t - rested, t - rested, t
+    print_["owner"], print_["whose"], print_["owned"] = 0, int(body["label"]), t - 0.1
+    clusters["x"], clusters["width"], clusters["n"], clusters["mirror"] = 0.1, 0.13, 6, -1
+    cost = np.zeros((1, 3))
+    costs(
+        clusters,
+        np.zeros(1, np.int64),
+        np.zeros((1, 4)),
+        np.ones(1, np.bool_),
+        prints,
+        bodies,
+        np.zeros(1, np.int64),
+        t,
+        cost,
+    )
+    landed, stands = cost[0, 0], cost[0, 1]
+    assert stands < landed - 2.0
