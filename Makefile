@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor bench-feet floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -14,6 +14,7 @@ help:
 	@echo "make bench-hand     right and wrong grasps of the hand agent (docs/hand.md)"
 	@echo "make bench-cabinet  the smart cabinet on simulated boards (docs/cabinet_position.png)"
 	@echo "make bench-floor    floor sensing on simulated rooms (FLOOR='--quick' for a few minutes)"
+	@echo "make bench-feet     whose foot has landed, decision by decision (FEET='--fit' fits the numbers behind it)"
 	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
 	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
 	@echo "make bench-threads  laser mapping with one and with two threads, by the clock on the wall"
@@ -53,6 +54,9 @@ bench-cabinet: $(READY)
 
 bench-floor: $(READY)
 	$(BIN)/python benchmarks/floor.py $(FLOOR)
+
+bench-feet: $(READY)
+	$(BIN)/python benchmarks/floor_feet.py $(FEET)
 
 floor-pictures: $(READY)
 	$(BIN)/python benchmarks/floor_pictures.py

@@ -26,39 +26,29 @@ BLANK = np.zeros(1, CLUSTER)
 
 
 @njit(cache=True)
-def _crowded(c: Any, bodies: Any) -> bool:
-    """Whether somebody's foot is so near that this is hardly another body."""
-    for b in range(bodies.size):
-        body = bodies[b]
-        if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
-            return True
-        # Legs that are one thing to the laser fall apart now and then.
-        if body.used and body.confirmed and np.hypot(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
-            return True
-    return False
+def adopt(
+    bodies: Any,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    blank: Any,
+    prints: Any,
+    t: float,
+    sight: Any,
+    free: NDArray[np.bool_],
+) -> float:
+    """Let the clusters (m,) be the feet that ``columns`` (m,) says of the movers ``rows`` (k,): 2i and 2i + 1 of row i.
 
-
-@njit(cache=True)
-def _pushed(c: Any, bodies: Any, t: float) -> bool:
-    """Whether what begins is too wide for a foot and a person stands beside it."""
-    for b in range(bodies.size):
-        body = bodies[b]
-        person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
-        near = person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
-        if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
-            return True
-    return False
-
-
-@njit(cache=True)
-def chosen(bodies: Any, confirmed: int, rows: NDArray[np.int64]) -> int:
-    """Fill ``rows`` (n,) with the bodies that are ``confirmed`` (1) or not yet (0): how many there are."""
-    count = 0
-    for b in range(bodies.size):
-        if bodies[b].used and bodies[b].confirmed == confirmed:
-            rows[count] = b
-            count += 1
-    return count
+    ``free`` (m,) becomes which of them are nobody's. The negative log likelihood of not having seen those in view.
+    """
+    free[:] = True
+    _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
+    _complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
+    unseen = missed(bodies, rows, t, sight)
+    expect(bodies, t, sight)
+    return float(unseen)
 
 
 @njit(cache=True)
@@ -153,26 +143,36 @@ def _complete(
 
 
 @njit(cache=True)
-def adopt(
-    bodies: Any,
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    blank: Any,
-    prints: Any,
-    t: float,
-    sight: Any,
-    free: NDArray[np.bool_],
-) -> float:
-    """Let the clusters (m,) be the feet that ``columns`` (m,) says of the movers ``rows`` (k,): 2i and 2i + 1 of row i.
+def chosen(bodies: Any, confirmed: int, rows: NDArray[np.int64]) -> int:
+    """Fill ``rows`` (n,) with the bodies that are ``confirmed`` (1) or not yet (0): how many there are."""
+    count = 0
+    for b in range(bodies.size):
+        if bodies[b].used and bodies[b].confirmed == confirmed:
+            rows[count] = b
+            count += 1
+    return count
 
-    ``free`` (m,) becomes which of them are nobody's. The negative log likelihood of not having seen those in view.
-    """
-    free[:] = True
-    _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
-    _complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
-    unseen = missed(bodies, rows, t, sight)
-    expect(bodies, t, sight)
-    return float(unseen)
+
+@njit(cache=True)
+def _crowded(c: Any, bodies: Any) -> bool:
+    """Whether somebody's foot is so near that this is hardly another body."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
+            return True
+        # Legs that are one thing to the laser fall apart now and then.
+        if body.used and body.confirmed and np.hypot(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _pushed(c: Any, bodies: Any, t: float) -> bool:
+    """Whether what begins is too wide for a foot and a person stands beside it."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
+        near = person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
+        if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
+            return True
+    return False
