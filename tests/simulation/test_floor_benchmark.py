@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +88,18 @@ def test_feet_that_land_near_others_are_mostly_likeliest_their_owners(benchmark:
     landings = choices(("three close", 1, "prints", "coarse"), 45.0)
     assert len(landings) > 30 and all(sum(one.owner for one in choice.candidates) == 1 for choice in landings)
     assert sum(choice.right for choice in landings) > 0.7 * len(landings)
-    assert any(one.lands and len(one.state) == 8 for choice in landings for one in choice.candidates)
+
+
+def test_the_fit_begins_with_what_the_estimator_makes_of_a_landing(benchmark: Any) -> None:
+    import floor_landing
+    from floor_feet import Choice, choices
+
+    seen = [one for choice in choices(("three close", 1, "prints", "coarse"), 45.0) for one in choice.candidates]
+    landed = [one for one in seen if one.lands]
+    pairs = [Choice(1, [replace(one, owner=True), replace(one, owner=False)]) for one in landed]
+    costs = floor_landing._costs(floor_landing._start(), floor_landing._Data(pairs))
+    assert len(landed) > 30
+    assert costs == pytest.approx(np.repeat([one.cost for one in landed], 2))
 
 
 def test_the_fit_makes_owners_likelier_than_the_numbers_it_begins_with(

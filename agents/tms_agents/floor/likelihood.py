@@ -22,6 +22,7 @@ from tms_agents.floor.build import (
 )
 from tms_agents.floor.landing import landing
 from tms_agents.floor.prints import lay_before
+from tms_agents.floor.segmentation import BRIDGE
 from tms_agents.floor.shine import unlike
 
 Array = NDArray[np.float64]
@@ -57,9 +58,9 @@ _PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
-#: One that is part of a foot that something hides the middle of: so many beams lie between both parts at least; at
-#: most if something dark did not echo there, and if something is before it.
-_PART, _FEW, _FADED, _HIDDEN = 2.0, 2, 4, 40
+#: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
+#: at most if nothing nearer is seen there: something dark did not echo.
+_PART, _FEW, _FADED = 2.0, 2, 4
 
 
 @njit(cache=True)
@@ -142,7 +143,7 @@ def _part(clusters: Any, i: int, longest: float) -> bool:
         if o == i or p.mirror != c.mirror or p.width < c.width or (p.width == c.width and o > i):
             continue
         between = max(c.first - p.last, p.first - c.last) - 1
-        if not _FEW <= between <= _HIDDEN:
+        if not _FEW <= between <= BRIDGE:
             continue
         hidden = c.cut != 0 and p.cut != 0
         if (hidden or between <= _FADED) and np.hypot(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width) < longest:

@@ -40,7 +40,7 @@ CLUSTER = np.dtype(
 #: The middle of a thing lies behind the surface seen by this share of its width (discs 0.39, boxes 0.3 to 0.5).
 _DEPTH = 0.37
 #: A jump between surfaces (m); the parts of one thing behind a thin post are at most so far apart (m, beams).
-_EDGE_M, _HIDDEN_M, _BRIDGE = 0.08, 0.15, 40
+_EDGE_M, _HIDDEN_M, BRIDGE = 0.08, 0.15, 40
 #: What is seen in a mirror is what is seen directly if it is so near it (m, and share of the width).
 _SAME_M, _SAME = 0.06, 0.25
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
@@ -104,7 +104,7 @@ def _segment(
         joined = False
         if _flickers(ranges, i):
             continue
-        if count > 0 and (clusters[count - 1].mirror >= 0) == mirrored and i - last <= _BRIDGE:
+        if count > 0 and (clusters[count - 1].mirror >= 0) == mirrored and i - last <= BRIDGE:
             before = ranges[last]
             angle = step[last] * (i - last)
             reach = min(r, before) * np.sin(angle) / np.sin(max(grazing - angle, 0.02)) + 0.012 + 0.004 * r

@@ -78,28 +78,13 @@ def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ag
     body["used"] = body["confirmed"] = body["shoe"] = 1
     body["at"], body["x"], body["vx"], body["pp"], body["stride"] = t, 1.2, 0.9, 0.02, 0.6
     body["ax"], body["a_seen"], body["a_print"], body["a_land"] = 1.0, t - 0.1, -1, t - 0.6
-    body["bx"], body["b_seen"], body["b_print"], body["b_land"], body["b_since"] = (
-        0.1,
-        t - 0.1,
-        0,
-        t - rested,
-        t - rested,
-    )
+    body["bx"], body["b_seen"], body["b_print"] = 0.1, t - 0.1, 0
+    body["b_land"] = body["b_since"] = t - rested
     print_ = prints[0]
     print_["used"], print_["x"], print_["first"], print_["rested"], print_["last"] = 1, 0.1, t - rested, t - rested, t
     print_["owner"], print_["whose"], print_["owned"] = 0, int(body["label"]), t - 0.1
     clusters["x"], clusters["width"], clusters["n"], clusters["mirror"] = 0.1, 0.13, 6, -1
-    cost = np.zeros((1, 3))
-    costs(
-        clusters,
-        np.zeros(1, np.int64),
-        np.zeros((1, 4)),
-        np.ones(1, np.bool_),
-        prints,
-        bodies,
-        np.zeros(1, np.int64),
-        t,
-        cost,
-    )
+    cost, one = np.zeros((1, 3)), np.zeros(1, np.int64)
+    costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, t, cost)
     landed, stands = cost[0, 0], cost[0, 1]
     assert stands < landed - 2.0
