@@ -65,6 +65,73 @@ def test_who_walks_out_of_the_door_has_left_before_a_second_is_over(
     assert [type(event) for event in events] == ([Vanished] if left else [])
 
 
+def behind(low: float, high: float, away: float) -> tuple:
+    """What a laser sees where something ``away`` m off hides all between two angles (rad)."""
+    angles = -0.5 + STEP * np.arange(101)
+    hidden = (low < angles) & (angles < high)
+    states = np.where(hidden, FOREGROUND, BACKGROUND).astype(np.int8)
+    return (np.where(hidden, away, 8.0), states, *OPEN[2:])
+
+
+def happens(one: Tracks, sight: tuple, seconds: float) -> list[type]:
+    times = NOW + np.arange(0.0, seconds, 0.1)
+    return [
+        type(event)
+        for t in times
+        for event in one.review(float(t), 0.1, sight, lambda: 9, lambda body: False, learned=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("sight", "stays"),
+    [(behind(0.02, 0.06, 1.0), True), (OPEN, False), (behind(-0.2, -0.1, 1.0), False)],
+    ids=["one foot is hidden", "both are in view", "what is hidden is elsewhere"],
+)
+def test_who_stood_has_gone_when_the_places_of_his_feet_are_seen_to_be_free(sight: tuple, stays: bool) -> None:
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], 2.5, 0.0, (0.0, 0.0), NOW - 0.2)
+    one.bodies[0]["rest_at"] = NOW - 20.0
+    told = happens(one, sight, 10.0)
+    assert told == [Stale]
+    assert bool(one.bodies[0]["used"]) == stays
+
+
+@pytest.mark.parametrize(
+    ("way", "region", "left"),
+    [((0.0, 1.0), None, True), ((0.0, -1.0), None, False), ((0.0, 1.0), ROOM, False)],
+    ids=["out of view", "back into view", "no door there"],
+)
+def test_who_walks_on_behind_something_and_out_of_reach_has_left_where_no_walls_are_known(
+    way: tuple[float, float], region: list[tuple[float, float]] | None, left: bool
+) -> None:
+    one = tracks([DOOR] if region else [], region)
+    walker(one.bodies[0], 4.0, 1.4, way, NOW - 0.35)
+    told = happens(one, behind(0.15, 0.6, 1.0), 12.0)
+    assert told == ([Stale, Vanished] if left else [Stale])
+
+
+@pytest.mark.parametrize(
+    ("stands", "began", "goes", "label"),
+    [(3.6, (4.9, 1.5), (4.5, 1.9), 9), (2.6, (4.0, 1.5), (3.6, 1.9), 1), (4.1, (4.9, 1.5), (4.9, 2.1), 1)],
+    ids=["comes in", "begins in the room", "stood at the door"],
+)
+def test_who_comes_in_by_the_door_is_not_one_who_stands_in_the_room_on_one_leg(
+    stands: float, began: tuple[float, float], goes: tuple[float, float], label: int
+) -> None:
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], stands, 1.5, (0.0, 0.0), NOW)
+    one.bodies[0]["b_seen"], one.bodies[0]["a_since"] = NOW - 6.0, NOW - 10.0
+    new = one.bodies[1]
+    new["used"], (new["x0"], new["y0"]), (new["x"], new["y"]) = 1, began, goes
+    new["ax"], new["ay"], new["bx"], new["by"] = goes[0], goes[1] + 0.1, goes[0] - 0.2, goes[1] - 0.1
+    new["first"], new["seen"], new["a_seen"], new["b_seen"] = NOW - 2.5, NOW, NOW, NOW - 0.1
+    new["a_since"] = new["b_since"] = NOW - 0.3
+    new["hits"] = new["looks"] = new["due"] = 25
+    new["score"], new["both"], new["width"] = 25.0, 5, 0.1
+    (event,) = at(one, NOW)
+    assert (event.label, isinstance(event, Appeared)) == (label, label == 9)
+
+
 def test_who_was_last_seen_on_this_side_of_the_threshold_may_turn_round_in_the_door_and_has_left_if_he_does_not() -> (
     None
 ):
