@@ -4,7 +4,7 @@
     python benchmarks/floor.py --quick             the same with two seeds of each kind and a short hour
     python benchmarks/floor.py --only movers       or objects, plain, static, samples, speed, memory
     python benchmarks/floor.py --seeds unseen      or tuning; both by default
-    python benchmarks/floor.py --first 1070        other unseen seeds: five from there on
+    python benchmarks/floor.py --first 1070        other unseen seeds: five from there on, or --count of them
     python benchmarks/floor.py --look "three" --seed 3 --feet prints     one world in numbers
 
 Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz; `plain`: of 683 beams that reach 5.6 m
@@ -75,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--only", choices=("movers", "objects", "plain", "static", "samples", "speed", "memory"))
     parser.add_argument("--seeds", choices=("tuning", "unseen", "both"), default="both")
     parser.add_argument("--first", type=int, default=UNSEEN, help="first of the unseen seeds")
+    parser.add_argument("--count", type=int, default=5, help="how many unseen seeds")
     parser.add_argument("--contestants", default="ours,laboratory", help="comma separated")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--hours", type=float, help="simulated hours of --only memory and static, 24 and 1 by default")
@@ -82,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--feet", choices=FEET, default="prints", help="with --look")
     parser.add_argument("--seed", type=int, default=1, help="with --look")
     args = parser.parse_args(arguments)
+    if args.count < 1:
+        parser.error("at least one seed must be played")
     names = args.contestants.split(",")
     if unknown := set(names) - set(CONTESTANTS):
         parser.error(f"no contestant {', '.join(unknown)}; there are {', '.join(CONTESTANTS)}")
@@ -92,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             return
         except ValueError as error:
             parser.error(str(error))
-    seeds = {"tuning": TUNING_SEEDS, "unseen": range(args.first, args.first + 5)}
+    seeds = {"tuning": TUNING_SEEDS, "unseen": range(args.first, args.first + args.count)}
     seeds = {name: found[:2] if args.quick else found for name, found in seeds.items() if args.seeds in (name, "both")}
     with ProcessPoolExecutor(args.jobs) as pool:
         if args.only in (None, "movers", "objects"):
