@@ -58,9 +58,6 @@ _PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
-#: One on which somebody stands who has stood there on two feet for so long (s), the last time seen so long ago (s) at
-#: most: feet do not leave what is still there.
-_HIS, _STANDING_S, _JUST_S = 16.0, 2.0, 1.0
 #: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
 #: at most if nothing nearer is seen there: something dark did not echo.
 _PART, _FEW, _FADED = 2.0, 2, 4
@@ -164,16 +161,6 @@ def waits(body: Any, c: Any) -> bool:
 
 
 @njit(cache=True)
-def _stands_on(body: Any, print_index: int, t: float) -> bool:
-    """Whether the body stands on two feet, of which this print is one."""
-    a, b = body.a_print, body.b_print
-    if body.robot or body.stale or body.wide > 0.6 or a < 0 or b < 0 or a == b or print_index not in (a, b):
-        return False
-    since, seen = max(body.a_since, body.b_since), min(body.a_seen, body.b_seen)
-    return bool(t - since > _STANDING_S and t - seen < _JUST_S)
-
-
-@njit(cache=True)
 def _strides(body: Any, c: Any) -> float:
     """How far (m) the nearer foot of the body would have to step to the cluster."""
     return float(min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by)))
@@ -209,16 +196,13 @@ def costs(
         cost[i, 2 * k + i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
         if age > _FRESH_S and c.width < WIDE_M and not narrow(c) and not c.attached:
             # What was nobody's stays nobody's.
-            stands, his = False, False
+            stands = False
             for column in range(k):
                 body = bodies[rows[column]]
                 stands = stands or body.a_print == of[i] or body.b_print == of[i] or waits(body, c)
                 part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
                 stands = stands or part
-                his = his or _stands_on(body, of[i], t)
-            if his:
-                cost[i, 2 * k + i] = _HIS
-            elif not stands:
+            if not stands:
                 cost[i, 2 * k + i] = _RESTS
         if _part(clusters, i, LONGEST_SHOE_M if shod else _LEG_M):
             cost[i, 2 * k + i] = min(cost[i, 2 * k + i], _PART)

@@ -64,10 +64,6 @@ _UNSURE_S = 6.0
 _BEGAN_M, _STILL_THERE_M = 0.03, 0.12
 #: What somebody has put down is so near him (m), also when he has gone on for a moment.
 _PUT_M, _PUT_S = 1.2, 3.0
-#: Who has rested for so long (s) stood on the feet that were seen within this (s) of the last one; half an ankle (m).
-_STOOD_STILL_S, _AT_ONCE_S, _ANKLE_M = 2.0, 1.0, 0.04
-#: Places on the way of one who is hidden that are looked at: so many, so far apart (m).
-_LOOKS, _LOOK_M = 4, 0.5
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 
@@ -164,38 +160,6 @@ def _accompanied(bodies: Any, b: int, t: float) -> bool:
         person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < 0.5
         if person and np.hypot(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
             return True
-    return False
-
-
-@njit(cache=True)
-def _stood_hidden(
-    body: Any, ranges: Array, states: NDArray[np.int8], longest: Array, pose: Array, first: float, step: float
-) -> bool:
-    """Whether something hides a foot of one who stood: he has gone when the places of his feet are seen to be free."""
-    if body.robot or body.seen - body.rest_at < _STOOD_STILL_S:
-        return False
-    for which in range(2):
-        x, y, at = (body.ax, body.ay, body.a_seen) if which == 0 else (body.bx, body.by, body.b_seen)
-        lately = at >= 0.0 and body.seen - at < _AT_ONCE_S
-        if lately and clear(x, y, _ANKLE_M, ranges, states, longest, pose, first, step) == HIDDEN:
-            return True
-    return False
-
-
-@njit(cache=True)
-def _comes_out(
-    body: Any, ranges: Array, states: NDArray[np.int8], longest: Array, pose: Array, first: float, step: float
-) -> bool:
-    """Whether who walks on behind something would be out of reach, or behind a wall, when it hides him no more."""
-    dx, dy = body.x - body.told_x, body.y - body.told_y
-    far = np.hypot(dx, dy)
-    if body.robot or far < _REST_M:
-        return False
-    for i in range(1, _LOOKS + 1):
-        ahead = i * _LOOK_M / far
-        view = clear(body.x + ahead * dx, body.y + ahead * dy, 0.15, ranges, states, longest, pose, first, step)
-        if view != HIDDEN:
-            return bool(view != FREE)
     return False
 
 
@@ -304,16 +268,12 @@ def review(
             continue
         if unseen > 0.12:
             view = clear(body.x, body.y, 0.15, ranges, states, longest, pose, first, step)
-            if view == FREE and _stood_hidden(body, ranges, states, longest, pose, first, step):
-                view = HIDDEN
             if view == FREE:
                 body.clear += dt
             elif view == UNSEEN or (view == WALLED and not inside):
                 # Where no walls are known, who walks on out of sight is soon far.
                 walks = not inside and np.hypot(body.x - body.told_x, body.y - body.told_y) > _REST_M
                 body.clear += dt if walks else 0.5 * dt
-            elif view == HIDDEN and not inside and _comes_out(body, ranges, states, longest, pose, first, step):
-                body.clear += 0.5 * dt
             elif view == HIDDEN:
                 body.clear = max(0.0, body.clear - 0.5 * dt)
         if body.clear > leave_s or unseen > hidden_s:

@@ -36,8 +36,6 @@ _FOOT_S = 1.5
 _RESTS_S = 2.0
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
-#: Who turns up in a door is hardly one who seems to stand farther (m) from there.
-_BY_THE_DOOR_M = 0.9
 #: Who has gone out of the room and is not seen for so long (s) has left.
 _THROUGH_S = 0.6
 #: Who is so near (m) is in a door. Of a way out of the room so many places are looked at.
@@ -292,7 +290,6 @@ class Tracks:
     def _missing(self, body: Any) -> Any:
         """The mover not seen now that this one most probably is: hidden, seated, or only thought to be seen."""
         best, best_gap = None, 1.0
-        comes_in = self._gates.distance(float(body["x0"]), float(body["y0"])) == 0.0
         broad = body["wide"] > 0.3 or is_footless(body)
         for other in self.bodies:
             if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
@@ -309,8 +306,6 @@ class Tracks:
             since = max(0.0, float(body["first"]) - seen)
             gap = math.hypot(body["x0"] - x, body["y0"] - y)
             reach = _OUT_M + min(_SPEED * since, 1.2)
-            if steps and comes_in:
-                reach = _BY_THE_DOOR_M
             if steps and since < _STEPS_S:
                 reach = max(reach, _STRIDE_M)
             for out_of_view, area in ((self._seated, self._seats), (self._masked, self._masks)):

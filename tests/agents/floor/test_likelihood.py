@@ -88,31 +88,3 @@ def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ag
     costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, t, cost)
     landed, stands = cost[0, 0], cost[0, 1]
     assert stands < landed - 2.0
-
-
-@pytest.mark.parametrize(
-    ("change", "his"),
-    [
-        ({}, True),
-        ({"b_print": -1}, False),  # it may be a thing that was put down: he stands on one foot
-        ({"a_since": 9.0}, False),  # he has just come
-        ({"b_seen": 8.0}, False),
-        ({"stale": 1}, False),
-    ],
-    ids=["stands", "on one foot", "has just come", "one not seen", "not seen"],
-)
-def test_feet_do_not_leave_what_is_still_there(change: dict[str, float], his: bool) -> None:
-    t, clusters, prints, bodies = 10.0, np.zeros(2, CLUSTER), empty(PRINT, 2), empty(BODY, 1)
-    clusters["x"], clusters["y"], clusters["width"], clusters["n"], clusters["mirror"] = 2.0, (0.1, -0.1), 0.1, 6, -1
-    prints["used"], prints["x"], prints["y"], prints["first"] = 1, 2.0, (0.1, -0.1), 5.0
-    body = bodies[0]
-    body["used"] = body["confirmed"] = 1
-    body["x"], body["pp"], body["a_print"], body["b_print"] = 2.0, 0.01, 0, 1
-    body["ax"], body["bx"], body["ay"], body["by"] = 2.0, 2.0, 0.1, -0.1
-    body["a_since"] = body["b_since"] = 5.0
-    body["a_seen"] = body["b_seen"] = t - 0.1
-    for name, value in change.items():
-        body[name] = value
-    cost, free, alone = np.zeros((2, 4)), np.ones(2, np.bool_), np.zeros(1, np.int64)
-    costs(clusters, np.arange(2), np.zeros((2, 4)), free, prints, bodies, alone, t, cost)
-    assert (cost[0, 2] > 15.0) == his
