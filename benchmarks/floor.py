@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=1, help="with --look")
     args = parser.parse_args(arguments)
     if args.count < 1:
-        parser.error("at least one seed must be played")
+        parser.error(f"at least one seed must be played, not {args.count}")
     names = args.contestants.split(",")
     if unknown := set(names) - set(CONTESTANTS):
         parser.error(f"no contestant {', '.join(unknown)}; there are {', '.join(CONTESTANTS)}")

@@ -74,7 +74,7 @@ def test_the_tables_hold_what_is_asked_for(benchmark: Any) -> None:
     assert len(movers_table({("things", "prints", "laboratory"): scores}).splitlines()) == 3
 
 
-@pytest.mark.parametrize("wrong", [["--look", "nothing"], ["--contestants", "ours,theirs"]])
+@pytest.mark.parametrize("wrong", [["--look", "nothing"], ["--contestants", "ours,theirs"], ["--count", "0"]])
 def test_a_wrong_word_is_one_clear_line(benchmark: Any, capsys: pytest.CaptureFixture[str], wrong: list[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         benchmark.main(wrong)
