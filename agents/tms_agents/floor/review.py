@@ -64,6 +64,8 @@ _UNSURE_S = 6.0
 _BEGAN_M, _STILL_THERE_M = 0.03, 0.12
 #: What somebody has put down is so near him (m), also when he has gone on for a moment.
 _PUT_M, _PUT_S = 1.2, 3.0
+#: Places on the way of one who is hidden that are looked at: so many, so far apart (m).
+_LOOKS, _LOOK_M = 4, 0.5
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 
@@ -160,6 +162,23 @@ def _accompanied(bodies: Any, b: int, t: float) -> bool:
         person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < 0.5
         if person and np.hypot(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
             return True
+    return False
+
+
+@njit(cache=True)
+def _comes_out(
+    body: Any, ranges: Array, states: NDArray[np.int8], longest: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether who walks on behind something would be out of reach, or behind a wall, when it hides him no more."""
+    dx, dy = body.x - body.told_x, body.y - body.told_y
+    far = np.hypot(dx, dy)
+    if body.robot or far < _REST_M:
+        return False
+    for i in range(1, _LOOKS + 1):
+        ahead = i * _LOOK_M / far
+        view = clear(body.x + ahead * dx, body.y + ahead * dy, 0.15, ranges, states, longest, pose, first, step)
+        if view != HIDDEN:
+            return bool(view != FREE)
     return False
 
 
@@ -274,6 +293,8 @@ def review(
                 # Where no walls are known, who walks on out of sight is soon far.
                 walks = not inside and np.hypot(body.x - body.told_x, body.y - body.told_y) > _REST_M
                 body.clear += dt if walks else 0.5 * dt
+            elif view == HIDDEN and not inside and _comes_out(body, ranges, states, longest, pose, first, step):
+                body.clear += 0.5 * dt
             elif view == HIDDEN:
                 body.clear = max(0.0, body.clear - 0.5 * dt)
         if body.clear > leave_s or unseen > hidden_s:

@@ -41,6 +41,13 @@ CLUSTER = np.dtype(
 _DEPTH = 0.37
 #: A jump between surfaces (m); the parts of one thing behind a thin post are at most so far apart (m, beams).
 _EDGE_M, _HIDDEN_M, BRIDGE = 0.08, 0.15, 40
+#: Where a surface is seen almost along it, what is beside it, of so few beams, so narrow (m), is a shred of it; at most
+#: so many beams between are missing.
+_SHRED, _SHRED_M, _LACKING = 2, 0.1, 1
+#: A shred is so far before the beam beside it at most (m), and so far behind (m): as the surface bends away smoothly,
+#: a little more than so many times as far as that beam is behind the one before it (m), or times the distance of two
+#: beams, whichever is more. What is farther behind is the other foot.
+_AHEAD_M, _BEHIND_M, _MORE_M, _BENDS, _SPACINGS = 0.1, 0.2, 0.03, 4.0, 7.0
 #: What is seen in a mirror is what is seen directly if it is so near it (m, and share of the width).
 _SAME_M, _SAME = 0.06, 0.25
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
@@ -182,6 +189,50 @@ def _lies(c: Any, dx: float, dy: float, u: float, v: float) -> None:
 
 
 @njit(cache=True)
+def _without_shreds(ranges: Array, clusters: Any) -> int:
+    """Give the shreds among ``clusters`` (m,) to what they are shreds of: how many, at the front, are left.
+
+    The side of a shoe that points at the laser, or of a robot, falls to clusters of one or two beams, each farther
+    away than the one before. Their beams belong to the whole; its place and width are those of its face.
+    """
+    m = clusters.size
+    shred = np.zeros(m, np.bool_)
+    for k in range(m):
+        if clusters[k].n <= _SHRED:
+            continue
+        for way in (-1, 1):
+            o = k + way
+            while 0 <= o < m and _is_shred(ranges, clusters[o], clusters[k], way):
+                shred[o] = True
+                if way > 0:
+                    clusters[k].last = clusters[o].last
+                else:
+                    clusters[k].first = clusters[o].first
+                o += way
+    kept = 0
+    for k in range(m):
+        if shred[k]:
+            continue
+        if kept != k:
+            clusters[kept] = clusters[k]
+        kept += 1
+    return kept
+
+
+@njit(cache=True)
+def _is_shred(ranges: Array, p: Any, c: Any, way: int) -> bool:
+    """Whether p, beside the cluster c in the direction ``way`` (±1) of the beams, is a shred of it."""
+    edge, beside = (c.last, p.first) if way > 0 else (c.first, p.last)
+    if p.mirror != c.mirror or p.n > _SHRED or p.width > _SHRED_M or way * (beside - edge) - 1 > _LACKING:
+        return False
+    most = _SPACINGS * c.spacing
+    inner = edge - way
+    if 0 <= inner < ranges.size and ranges[edge] > ranges[inner]:
+        most = max(most, _MORE_M + _BENDS * (ranges[edge] - ranges[inner]))
+    return bool(-_AHEAD_M < ranges[beside] - ranges[edge] < min(most, _BEHIND_M))
+
+
+@njit(cache=True)
 def _once(clusters: Any) -> int:
     """Move what is seen directly, or in a mirror alone, to the front of ``clusters`` (m,); how many these are."""
     kept = 0
@@ -216,4 +267,5 @@ class Segmenter:
         """The clusters of one scan (m,) of ``CLUSTER``: ranges, states, claimed, longest (n,), rays (n, 10)."""
         count = _segment(ranges, states, claimed, longest, rays, self._step, self._grazing, self._clusters)
         clusters = self._clusters[:count]
+        clusters = clusters[: _without_shreds(ranges, clusters)]
         return clusters[: _once(clusters)]

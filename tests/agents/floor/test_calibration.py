@@ -103,7 +103,7 @@ def walk(seconds=26.0, people=1, offset=0.0):
 def test_walkers_tell_where_the_other_laser_is(people, offset):
     known, other = walk(people=people, offset=offset)
     found = register(walker_tracks(known, A), walker_tracks(other, (0.0, 0.0, 0.0)))
-    assert math.dist(found.pose[:2], B[:2]) < 0.06
+    assert math.dist(found.pose[:2], B[:2]) < 0.07
     assert turned(found.pose[2] - B[2]) < math.radians(1.5)
     assert found.offset_s == pytest.approx(offset, abs=0.11)
     assert found.rmse_m < 0.1 and found.places > 50

@@ -65,6 +65,37 @@ def test_who_walks_out_of_the_door_has_left_before_a_second_is_over(
     assert [type(event) for event in events] == ([Vanished] if left else [])
 
 
+def behind(low: float, high: float, away: float) -> tuple:
+    """What a laser sees where something ``away`` m off hides all between two angles (rad)."""
+    angles = -0.5 + STEP * np.arange(101)
+    hidden = (low < angles) & (angles < high)
+    states = np.where(hidden, FOREGROUND, BACKGROUND).astype(np.int8)
+    return (np.where(hidden, away, 8.0), states, *OPEN[2:])
+
+
+def happens(one: Tracks, sight: tuple, seconds: float) -> list[type]:
+    times = NOW + np.arange(0.0, seconds, 0.1)
+    return [
+        type(event)
+        for t in times
+        for event in one.review(float(t), 0.1, sight, lambda: 9, lambda body: False, learned=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("way", "region", "left"),
+    [((0.0, 1.0), None, True), ((0.0, -1.0), None, False), ((0.0, 1.0), ROOM, False)],
+    ids=["out of view", "back into view", "no door there"],
+)
+def test_who_walks_on_behind_something_and_out_of_reach_has_left_where_no_walls_are_known(
+    way: tuple[float, float], region: list[tuple[float, float]] | None, left: bool
+) -> None:
+    one = tracks([DOOR] if region else [], region)
+    walker(one.bodies[0], 4.0, 1.4, way, NOW - 0.35)
+    told = happens(one, behind(0.15, 0.6, 1.0), 12.0)
+    assert told == ([Stale, Vanished] if left else [Stale])
+
+
 def test_who_was_last_seen_on_this_side_of_the_threshold_may_turn_round_in_the_door_and_has_left_if_he_does_not() -> (
     None
 ):

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from floor_rooms import WALLS, cast, sweep
 
 from tms_agents.floor import Sensor
@@ -92,3 +93,29 @@ def test_what_is_seen_directly_and_in_a_mirror_is_one() -> None:
     assert sorted(one["mirror"] >= 0 for one in found) == [False, True]
     for one in found:
         assert min(math.hypot(one["x"] - x, one["y"] - y) for x, y in (places[0], places[2])) < 0.05
+
+
+def shoe(away: float, turn: float) -> list[tuple[float, float, float]]:
+    """A shoe whose heel is ``away`` m from the laser; its toes point ``turn`` rad aside of the beam."""
+    u, v = math.cos(math.pi / 4), math.sin(math.pi / 4)
+    c, s = math.cos(math.pi / 4 + turn), math.sin(math.pi / 4 + turn)
+    steps = np.linspace(0.0, 1.0, 30)
+    return [
+        (0.05 + away * u + 0.185 * k * c, 0.05 + away * v + 0.185 * k * s, 0.033 + 0.013 * k) for k in steps.tolist()
+    ]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.03, 0.06, 0.1, 0.2, math.pi / 2])
+@pytest.mark.parametrize("away", [1.5, 2.0, 2.7, 3.5])
+def test_a_shoe_is_one_cluster_also_where_it_points_at_the_laser(away: float, turn: float) -> None:
+    (cluster,) = clusters(shoe(away, turn))
+    face = clusters(shoe(away, 0.0)[:1])[0]
+    assert int(cluster["first"]) <= int(face["first"])
+    assert int(cluster["last"]) >= int(face["last"])
+
+
+def test_what_stands_behind_the_edge_of_something_is_no_shred_of_it() -> None:
+    found = clusters([(2.0, 2.0, 0.05), (2.3, 2.15, 0.05)])
+    assert len(found) == 2
+    thin = clusters([(2.0, 2.0, 0.05), (2.35, 2.19, 0.008)])
+    assert len(thin) == 2
