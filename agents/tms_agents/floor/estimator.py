@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.build import count_shoes, legs
+from tms_agents.floor.dark import dark_width
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
@@ -40,6 +41,8 @@ _WAITS_S, _STOPS_S = 25.0, 8.0
 _UNSETTLED_S = 30.0
 #: So wide (m) is no edge of anybody.
 _EDGE_M = 0.12
+#: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
+_MUTE_S, _DARK_M = 1.0, 0.3
 #: Of saved states; 9: who may have turned round in a door.
 _FORMAT = 9
 
@@ -193,7 +196,16 @@ class FloorEstimator:
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED
             return []
+        if t - q["silent"] < _MUTE_S and self._dark_width(q) > _DARK_M:
+            q["revealed"] = LOOKS
+            return []
         return self._objects.born(index, self._prints, self._tracks.bodies, self._new_label(), t)
+
+    def _dark_width(self, q: Any) -> float:
+        """How wide (m) that is of which the sensor that has met the print last sees a part: black or glossy."""
+        view = next(view for view in self._views.values() if view.index == q["sensor"])
+        beams = int(q["first_beam"]), int(q["last_beam"])
+        return float(dark_width(*beams, float(q["near"]), view.ranges, view.background.longest, view.step))
 
     def _protect(self, view: View, clusters: Any, of: NDArray[np.int64], somebodys: NDArray[np.bool_]) -> None:
         """What is somebody or something is not learned as background; furniture is, at once."""
@@ -241,6 +253,7 @@ class FloorEstimator:
             "waiting": [[k, rested, who] for k, (rested, who) in self._objects.waiting.items()],
             "robot_at": self._objects.robot_at if np.isfinite(self._objects.robot_at) else None,
             "furniture": self._furniture.save(),
+            "legs": self._furniture.legs,
             "extrinsics": self._extrinsics.save(),
             "labels": self._labels,
             "t": self._t if np.isfinite(self._t) else None,
@@ -286,6 +299,7 @@ class FloorEstimator:
             }
             self._objects.robot_at = -np.inf if state["robot_at"] is None else float(state["robot_at"])
             self._furniture.restore(state["furniture"])
+            self._furniture.legs = [(float(t), float(x), float(y)) for t, x, y in state.get("legs", ())]
             self._extrinsics.restore(state["extrinsics"])
             self._labels = int(state["labels"])
             self._t = -np.inf if state["t"] is None else float(state["t"])

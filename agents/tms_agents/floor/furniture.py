@@ -11,6 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+#: Of a leg that was moved: since when (s) it has rested where, x and y (m).
+Leg = tuple[float, float, float]
 
 #: Why a print is furniture: by its looks, or because a piece that has gone from nearby looks like it.
 LOOKS, MOVED = 1, 2
@@ -25,6 +27,8 @@ _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 _THIN_WIDTH_M = 0.01
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
+#: Legs known for so long (s) tell of one that is believed later, and are elsewhere if so far (m) off.
+_LEGS_S, _SAME_LEG_M = 60.0, 0.05
 #: The ranges of one surface differ so little from beam to beam (m); something thin hides so much of it (m).
 _SAME_M, _HIDDEN_M = 0.05, 0.15
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
@@ -111,8 +115,11 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
     return count
 
 
-def _legs(print_: Any, prints: Any) -> bool:
-    """Whether the print and at least two others are thin, near each other, and stand there since the same time."""
+def _legs(print_: Any, prints: Any, known: list[Leg]) -> bool:
+    """Whether the print and at least two others are thin, near each other, and stand there since the same time.
+
+    Others are ``prints``, or ``known`` to be legs.
+    """
     if print_["width"] > _THIN_M or print_["given"] == 1 or print_["mutes"] > print_["hits"]:
         # What was put down by somebody who stands beside it has not been pushed there; parts of what is black or
         # glossy are no legs.
@@ -121,7 +128,12 @@ def _legs(print_: Any, prints: Any) -> bool:
     thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)
     since = np.abs(prints["rested"] - print_["rested"])
     legs = thin & (away > _LEGS_M) & (away < _GROUP_M) & (since < np.where(prints["revealed"] > 0, 6.0, _TOGETHER_S))
-    return int(np.count_nonzero(legs)) >= 2
+    count = int(np.count_nonzero(legs))
+    for since, x, y in known:
+        far = math.hypot(x - print_["x"], y - print_["y"])
+        seen = np.hypot(prints["x"][legs] - x, prints["y"][legs] - y) < _SAME_LEG_M
+        count += abs(since - print_["rested"]) < _TOGETHER_S and _LEGS_M < far < _GROUP_M and not seen.any()
+    return count >= 2
 
 
 class Furniture:
@@ -130,6 +142,8 @@ class Furniture:
     def __init__(self) -> None:
         #: Where pieces were that are found again: t, x, y.
         self._found: list[tuple[float, float, float]] = []
+        #: Legs of furniture that was moved.
+        self.legs: list[Leg] = []
         self._rows = np.zeros((128, 5))
 
     def pieces(self, view: Any, t: float) -> list[Piece]:
@@ -143,8 +157,15 @@ class Furniture:
 
         Or thin as the leg of a chair, with two more among the ``prints`` that came to stand with it.
         """
-        if _legs(print_, prints):
+        self.legs = [leg for leg in self.legs if t - leg[0] < _LEGS_S][-64:]
+        if _legs(print_, prints, self.legs) or self._gone_from(print_, pieces, t):
+            if print_["width"] < _THIN_M:
+                self.legs.append((float(print_["rested"]), float(print_["x"]), float(print_["y"])))
             return True
+        return False
+
+    def _gone_from(self, print_: Any, pieces: list[Piece], t: float) -> bool:
+        """Whether the print is one of the ``pieces``."""
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
         near = [p for p in near if print_["rested"] - p.t + _GONE_S > -_EARLY_S]

@@ -10,6 +10,7 @@ import numpy as np
 
 from tms_agents.devices.scans import Sweep
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
+from tms_agents.floor.dark import dark_width
 from tms_agents.floor.freespace import look
 from tms_agents.floor.likelihood import costs
 from tms_agents.floor.prints import follow
@@ -46,3 +47,5 @@ def warm_up() -> None:
             ranges[np.abs(angles + 0.6) < 0.04] = 1.6
         estimator.scan("warm", t, ranges)
     estimator.labels()
+    # Nothing here is black.
+    dark_width(0, 0, 1.0, ranges, ranges, 0.01)

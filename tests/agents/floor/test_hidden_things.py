@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tms_agents.floor import FloorSettings
 from tms_agents.floor.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.dark import dark_width
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, LOOK, PAST, look
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.objects import Objects
@@ -122,6 +123,47 @@ def test_three_legs_that_came_together_are_a_chair_and_parts_of_one_black_thing_
     assert not Furniture().explains(close[0], close, [], 5.0)
     black = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4), mutes=30)
     assert not Furniture().explains(black[0], black, [], 5.0)
+
+
+@pytest.mark.parametrize(
+    ("rested", "away", "leg"),
+    [(1.0, 0.0, True), (9.0, 0.0, False), (1.0, 2.0, False)],
+    ids=["came with them", "came later", "elsewhere"],
+)
+def test_a_leg_that_is_believed_late_belongs_to_the_legs_known_before(rested: float, away: float, leg: bool) -> None:
+    furniture, chair = Furniture(), thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4))
+    chair["rested"] = 1.0
+    assert all(furniture.explains(one, chair, [], 5.0) for one in chair)
+    last = thin((2.4 + away, 2.4))
+    last["rested"] = rested
+    assert furniture.explains(last[0], last, [], 20.0) == leg
+    assert not furniture.explains(last[0], last, [], 300.0)
+
+
+def dark(echoes: list[int], between: list[int], *, ranges: float = 4.0) -> float:
+    """How wide what a few ``echoes`` at 2 m come from seems, where beams ``between`` bring nothing."""
+    seen, wall = np.full(200, ranges), np.full(200, 4.0)
+    seen[between], seen[echoes] = np.inf, 2.0
+    return float(dark_width(echoes[0], echoes[0], 2.0, seen, wall, 0.005))
+
+
+def test_of_a_black_front_a_few_beams_come_back_and_of_something_small_the_beams_beside_it_go_past() -> None:
+    front = list(range(80, 120))
+    assert dark([100], front) == pytest.approx(0.4)
+    assert dark([82, 100, 117], front) == pytest.approx(0.4)
+    assert dark([100], [98, 99, 101]) == pytest.approx(0.04)
+    assert dark([100, 150], [98, 99, 101, 149]) == pytest.approx(0.04)
+
+
+def test_something_thin_before_a_black_front_does_not_end_it_and_the_wall_beside_it_is_no_part_of_it() -> None:
+    seen, wall = np.full(200, 4.0), np.full(200, 4.0)
+    seen[80:120], seen[100], seen[90:93] = np.inf, 2.0, 1.0
+    assert dark_width(100, 100, 2.0, seen, wall, 0.005) == pytest.approx(0.4)
+    seen[85:95] = 1.0
+    assert dark_width(100, 100, 2.0, seen, wall, 0.005) == pytest.approx(0.25)
+    seen[80:120], seen[100] = 2.1, 2.0
+    wall[:] = 2.1
+    assert dark_width(100, 100, 2.0, seen, wall, 0.005) == pytest.approx(0.01)
 
 
 def test_a_thin_thing_is_no_leg_of_a_box_that_went() -> None:
