@@ -23,6 +23,8 @@ UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT, PAST = 0, 1, 2, 3, 4, 5, 6
 QUIET = 0.9
 #: Where nothing echoes behind it, a thing is missing when nothing echoes any more, if it did so reliably.
 _RELIABLE = 0.93
+#: So many beams beside those to a thing tell whether something dark stands before it.
+_BESIDE = 2
 #: Where the background is silent less often than this, silence shows that something black or glossy is there.
 _MUTE = 0.3
 
@@ -151,7 +153,7 @@ def look(
             inner = max(0.5, 0.75 * half_angle)
             shows = thing.part_by == sensor and thing.part_hits >= _STEADY and thing.rate > _ECHOES
             part = middle + thing.part / (away * abs(step))
-            hits, beyond, hidden, total, alien, mute = 0, 0, 0, 0, 0, 0
+            hits, beyond, hidden, total, alien, mute, unheard = 0, 0, 0, 0, 0, 0, 0
             x, y = 0.0, 0.0
             a, b = -1, -1
             o = 4 if v > 0 else 0
@@ -175,15 +177,18 @@ def look(
                     states[i] == BEYOND
                     or (states[i] == BACKGROUND and r > away - gate)
                     or (states[i] == FOREGROUND and r > away + gate)
-                    or (states[i] == NO_ECHO and empty[i] > 0.5 and thing.rate > _RELIABLE)
                 ):
                     beyond += 1
+                elif states[i] == NO_ECHO and empty[i] > 0.5 and thing.rate > _RELIABLE:
+                    unheard += 1
                 elif states[i] != NO_ECHO and r < away - gate:
                     hidden += 1
                 elif states[i] == NO_ECHO and empty[i] < _MUTE and thing.rate < QUIET:
                     mute += 1
             if total == 0:
                 continue
+            if unheard > 0 and not _nearer(ranges, states, low - _BESIDE, high + _BESIDE, away - gate):
+                beyond += unheard
             if hits > 0:
                 # More of it than was thought: hidden when it was first seen.
                 wide = int(_WIDEST_M / (away * abs(step)))
@@ -242,6 +247,15 @@ def look(
                 out.verdict = HIDDEN
             elif out.verdict == UNSEEN and (beyond == 0 or mute > 0):
                 out.verdict = SILENT
+
+
+@njit(cache=True)
+def _nearer(ranges: Array, states: NDArray[np.int8], low: int, high: int, before: float) -> bool:
+    """Whether something new stands nearer than ``before`` m: if it is dark, beams that bring nothing met it, too."""
+    for i in range(max(low, 0), min(high, ranges.size - 1) + 1):
+        if states[i] == FOREGROUND and ranges[i] < before:
+            return True
+    return False
 
 
 @njit(cache=True)

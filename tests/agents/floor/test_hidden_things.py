@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor import FloorSettings
-from tms_agents.floor.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.dark import dark_width
-from tms_agents.floor.freespace import FREE, HIDDEN, HIT, LOOK, PAST, look
+from tms_agents.floor.freespace import FREE, HIDDEN, HIT, LOOK, PAST, SILENT, look
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.objects import Objects
 from tms_agents.floor.prints import follow
@@ -51,17 +51,38 @@ def test_a_thing_half_hidden_has_gone_when_the_rest_of_it_is_seen_past() -> None
     assert removals([PAST if k % 20 == 0 else HIT for k in range(500)]) == 0
 
 
-def looked(things: np.ndarray, ranges: list[float], sensor: int = 0) -> int:
-    """The verdict of a laser of nine beams at the origin on the one thing; the background is 5 m away."""
+def looked(things: np.ndarray, ranges: list[float], sensor: int = 0, *, echoes: bool = True) -> int:
+    """The verdict of a laser of nine beams at the origin on the one thing; the background is 5 m away, or ``echoes``
+    nothing."""
     found, looks, n = np.array(ranges), np.zeros(1, LOOK), len(ranges)
-    states = np.where(found < 4.9, FOREGROUND, BACKGROUND).astype(np.int8)
+    states = np.where(found < 4.9, FOREGROUND, BACKGROUND if echoes else NO_ECHO).astype(np.int8)
     bearings = 0.02 * (np.arange(n) - (n - 1) / 2)
     rays = np.zeros((n, 10))
     rays[:, 2], rays[:, 3], rays[:, 8], rays[:, 9] = np.cos(bearings), np.sin(bearings), np.inf, -1
     direct, nowhere = np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]]), np.zeros(3)
-    background = np.zeros(n), np.full(n, 5.0)
+    background = np.full(n, float(not echoes)), np.full(n, 5.0 if echoes else np.inf)
     look(things, found, states, *background, rays, direct, nowhere, -0.08, 0.02, np.zeros(n, np.bool_), sensor, looks)
     return int(looks["verdict"][0])
+
+
+@pytest.mark.parametrize(
+    ("ranges", "verdict"),
+    [
+        ([0, 0, 0, 2.0, 2.0, 2.0, 0, 0, 0], HIT),
+        ([0, 0, 0, 0, 0, 0, 0, 0, 0], FREE),
+        ([0, 0, 0, 0, 1.0, 0, 0, 0, 0], HIDDEN),
+        ([0, 0, 0, 1.0, 0, 0, 0, 0, 0], SILENT),
+        ([1.0, 0, 0, 0, 0, 0, 1.0, 0, 0], SILENT),
+        ([1.0, 0, 0, 0, 0, 0, 0, 0, 1.0], FREE),
+    ],
+    ids=["there", "gone", "hidden", "behind something dark", "behind what echoes beside it", "between others"],
+)
+def test_where_nothing_echoes_behind_a_thing_silence_tells_nothing_while_something_dark_is_before_it(
+    ranges: list[float], verdict: int
+) -> None:
+    things = empty(THING, 1)
+    things["used"], things["x"], things["half"], things["rate"], things["part_by"] = 1, 2.0, 0.04, 0.99, -1
+    assert looked(things, [r or np.inf for r in ranges], echoes=False) == verdict
 
 
 @pytest.mark.parametrize("side", [1, -1])
