@@ -27,7 +27,7 @@ _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 _THIN_WIDTH_M = 0.01
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
-#: Legs known for so long (s) tell of one that is believed later, and are elsewhere if so far (m) off.
+#: Legs that came so long ago (s) at most tell of one that is believed later; so near (m) it is the same leg.
 _LEGS_S, _SAME_LEG_M = 60.0, 0.05
 #: The ranges of one surface differ so little from beam to beam (m); something thin hides so much of it (m).
 _SAME_M, _HIDDEN_M = 0.05, 0.15
