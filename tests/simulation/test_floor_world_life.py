@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tms_agents.simulation.floor_world import FINE, FloorWorld, LiveRoom, Mount, Robot, Thing, Wall
+from tms_agents.simulation.floor_world import FINE, LASERS, FloorWorld, LiveRoom, Mount, Robot, Thing, Wall
 from tms_agents.simulation.floor_world.gait import Build, Walker
 from tms_agents.simulation.floor_world.plan import Door, Plan, Ways
 from tms_agents.simulation.floor_world.room import Furniture
@@ -120,6 +120,36 @@ def test_things_of_all_sizes_come_and_go_and_are_seen() -> None:
         k = round(10 * span["t_placed"]) - walker["frames"][0]
         near = min(math.dist((walker["x"][i], walker["y"][i]), (span["x"], span["y"])) for i in range(k - 5, k + 5))
         assert near < 0.6
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"), [("things", 1416), ("near wall", 1406), ("robots", 1418), ("hidden", 1413), ("start", 1400)]
+)
+def test_nobody_acts_from_afar_or_vanishes_in_the_room_though_others_are_in_his_way(name: str, seed: int) -> None:
+    world = FloorWorld(name, seed)
+    life = world.life
+    while life.now < world.duration:
+        there = {one.id: one.xy for one in life.movers.values()}
+        lying = dict(life.room.things)
+        life.advance(life.now + 0.1)
+        for stay in life.stays:
+            for at, who in ((stay.placed_at, stay.placed_by), (stay.picked_at, stay.picked_by)):
+                if who is not None and at is not None and life.now - 0.1 < at <= life.now:
+                    assert math.dist(there[who], stay.thing.pose[:2]) < 0.85
+        for thing in life.room.things.keys() - lying.keys():
+            new = life.room.things[thing]
+            gaps = [math.dist(new.pose[:2], one.pose[:2]) - 0.5 * (new.size + one.size) for one in lying.values()]
+            assert min(gaps, default=1.0) > 0.0
+        assert not any(life.plan.contains(there[gone], -0.01) for gone in there.keys() - life.movers.keys())
+
+
+def test_who_meets_a_robot_in_the_door_lets_it_pass() -> None:
+    world = FloorWorld("robots", 2194, laser=LASERS["coarse"])
+    inside = set()
+    while world.life.now < world.duration:
+        world.life.advance(world.life.now + 0.5)
+        inside |= {one.id for one in world.life.movers.values() if world.life.plan.contains(one.xy, 0.5)}
+    assert inside == {"p1", "p2", "r1", "r2"}
 
 
 def test_things_are_hidden_for_longer_than_a_minute_and_one_is_taken_meanwhile() -> None:

@@ -20,8 +20,9 @@ _PERSONAL = 1.2
 #: What feet can do to speed up, slow down and turn, m/s2.
 _PUSH = 2.0
 _SWAY_M = 0.02
-#: Who gets no further for so long thinks of something else.
+#: Who gets no further for so long thinks of something else; a robot so near (m) is given way by so much (m) before.
 _STUCK_S = 4.0
+_NARROW_M, _ASIDE_M = 1.0, 0.8
 
 
 @dataclass(slots=True)
@@ -43,6 +44,7 @@ class Mover:
     _until: float = 0.0
     _began: float = 0.0
     _face: float | None = None
+    _aside: bool = False
     _from: Xy = (0.0, 0.0)
     _sway: Xy = (0.0, 0.0)
     _rest: Xy = (0.0, 0.0)
@@ -66,7 +68,7 @@ class Mover:
         task = self.task
         self._began, self._from, self._rest, self._sway = t, self.xy, self.xy, (0.0, 0.0)
         if isinstance(task, Go):
-            self._face = None
+            self._face, self._aside = None, False
             self._path = life.ways(self).path(self.xy, task.to) or []
             self._until = t + _STUCK_S
         elif isinstance(task, Wait):
@@ -90,7 +92,8 @@ class Mover:
             self._walk(life, dt)
             if math.hypot(*self.velocity) > 0.1 or self.size is not None:
                 self._until = t + _STUCK_S
-            return not self._path or t > min(self._until, self._began + task.patience_s)
+            late = t > min(self._until, self._began + task.patience_s)
+            return not self._path or (late and not self._step_aside(life, t))
         if isinstance(task, Drag):
             dx, dy = life.dragged(task, t, dt)
             there = (self.xy[0] + dx, self.xy[1] + dy)
@@ -100,6 +103,22 @@ class Mover:
         else:
             self._stand(dt)
         return t >= self._until
+
+    def _step_aside(self, life: Life, t: float) -> bool:
+        """Whether somebody in a robot's way, and it in his, now goes back a little; a robot itself never does."""
+        robots = [other for other in life.others(self) if other.size is not None]
+        robot = min(robots, key=lambda other: math.dist(self.xy, other.xy), default=None)
+        if self.size is not None or self._aside or robot is None or math.dist(self.xy, robot.xy) > _NARROW_M:
+            return False
+        ways = life.tight_ways()
+        turns = np.linspace(0.0, 2 * math.pi, 16, endpoint=False)
+        around = [(self.xy[0] + _ASIDE_M * math.cos(a), self.xy[1] + _ASIDE_M * math.sin(a)) for a in turns]
+        spots = [xy for xy in around if ways.is_free(xy)]
+        if not spots:
+            return False
+        self._path = [max(spots, key=lambda xy: math.dist(xy, robot.xy))]
+        self._aside, self._began, self._until = True, t, t + _STUCK_S
+        return True
 
     def _walk(self, life: Life, dt: float) -> None:
         while self._path and math.dist(self.xy, self._path[0]) < (0.06 if len(self._path) == 1 else 0.25):

@@ -167,7 +167,7 @@ def _start(life: Life, duration: float) -> None:
     def walking(me: Mover) -> Story:
         yield from wander(life, me, 0.4 * duration)
         yield from put(life, me, new_thing(life, 0.08, "o1"))
-        yield from wander(life, me, duration - 10)
+        yield from wander(life, me, duration)
 
     life.person("p1", 0.0, life.random_place(0.5), standing)
     life.person("p2", 0.0, life.random_place(0.5), walking)

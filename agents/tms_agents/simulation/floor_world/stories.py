@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from itertools import pairwise
 from typing import Literal
 
@@ -12,7 +13,10 @@ from tms_agents.simulation.floor_world.life import Life
 from tms_agents.simulation.floor_world.movers import Mover
 from tms_agents.simulation.floor_world.room import Thing
 from tms_agents.simulation.floor_world.shapes import Material, Pose, Xy
-from tms_agents.simulation.floor_world.tasks import Do, Drag, Face, Go, Sit, Story, Wait
+from tms_agents.simulation.floor_world.tasks import Do, Drag, Face, Go, Sit, Story, Task, Wait
+
+#: Who was kept from where he would go tries again, so often at most; so near (m) he is there, and so far he reaches.
+_TRIES, _THERE_M, _REACH_M = 4, 0.3, 0.75
 
 
 def wander(life: Life, me: Mover, until: float, pause: float = 0.4) -> Story:
@@ -49,28 +53,33 @@ def arrival(life: Life, i: int = 0) -> Xy:
 
 
 def leave(life: Life, me: Mover) -> Story:
-    """Out of the nearest door and out of sight."""
+    """Out of the nearest door and out of sight; nobody vanishes from the room."""
     doors = life.plan.doors
     door = min(doors, key=lambda d: math.dist(me.xy, (life.plan.width if d.wall == "e" else 0.0, d.y)))
     yield Go(life.plan.outside(door, me.rng), 40.0)
+    while life.plan.contains(me.xy, -0.3):
+        yield Wait(me.rng.uniform(0.5, 3.0))
+        yield Go(life.plan.outside(door, me.rng), 40.0)
 
 
 def put(life: Life, me: Mover, thing: Thing) -> Story:
-    """Go there, bend down, put it, get up."""
-    yield from _stand_before(life, me, thing.pose[:2])
+    """Go there, bend down, put it, get up; nothing where one does not get or where something else lies by now."""
+    reaches = yield from _stand_before(life, me, thing.pose[:2])
     while any(math.dist(other.xy, thing.pose[:2]) < other.radius + 0.2 for other in life.others(me)):
         yield Wait(0.5)
-    yield Do(lambda t: life.place(thing, me.id, t))
-    yield Wait(me.rng.uniform(0.4, 1.2))
+    if reaches and not _is_taken(life, thing):
+        yield Do(lambda t: life.place(thing, me.id, t))
+        yield Wait(me.rng.uniform(0.4, 1.2))
 
 
 def pick(life: Life, me: Mover, thing: str) -> Story:
     """The same the other way round; nothing where somebody else was faster."""
     if thing not in life.room.things:
         return
-    yield from _stand_before(life, me, life.room.things[thing].pose[:2])
-    yield Do(lambda t: life.pick(thing, me.id, t) if thing in life.room.things else None)
-    yield Wait(me.rng.uniform(0.4, 1.2))
+    reaches = yield from _stand_before(life, me, life.room.things[thing].pose[:2])
+    if reaches:
+        yield Do(lambda t: life.pick(thing, me.id, t) if thing in life.room.things else None)
+        yield Wait(me.rng.uniform(0.4, 1.2))
 
 
 def push(life: Life, me: Mover, furniture: str, to: Pose) -> Story:
@@ -86,7 +95,8 @@ def push(life: Life, me: Mover, furniture: str, to: Pose) -> Story:
             break
     else:
         return
-    yield Go(start)
+    if not (yield from _arrive(me, start)):
+        return
     yield Face(piece.pose[:2])
     corners = life.clear_way(me, furniture, to)
     far = sum(math.dist(a, b) for a, b in pairwise([piece.pose[:2], *corners]))
@@ -100,7 +110,8 @@ def sit(life: Life, me: Mover, seconds: float) -> Story:
     c, s = math.cos(bed.pose[2]), math.sin(bed.pose[2])
     sides = [(bed.pose[0] - v * s, bed.pose[1] + v * c) for v in (0.85, -0.85)]
     side = max(sides, key=lambda xy: life.plan.contains(xy, 0.2) and life.ways(me).is_free(xy))
-    yield Go(life.ways(me).nearest_free(side))
+    if not (yield from _arrive(me, life.ways(me).nearest_free(side))):
+        return
     inward = (bed.pose[0] - side[0], bed.pose[1] - side[1])
     yield Sit((side[0] + 0.75 * inward[0], side[1] + 0.75 * inward[1]), seconds)
 
@@ -141,18 +152,38 @@ def would_see(life: Life, thing: Thing, laser: str | None = None) -> bool:
     return False
 
 
-def _stand_before(life: Life, me: Mover, xy: Xy) -> Story:
-    ways = life.ways(me)
-    spots = []
-    for turn in np.linspace(0, 2 * math.pi, 24, endpoint=False):
-        gap = me.rng.uniform(0.36, 0.46)
-        spot = (xy[0] + gap * math.cos(turn), xy[1] + gap * math.sin(turn))
-        if life.plan.contains(spot, 0.22) and life.tight_ways().is_free(spot):
-            spots.append(spot)
-    spot = spots[me.rng.integers(len(spots))] if spots else ways.nearest_free(xy)
-    yield Go(spot)
-    yield Face(xy)
-    yield Wait(me.rng.uniform(0.6, 1.4))
+def _arrive(me: Mover, to: Xy) -> Generator[Task, None, bool]:
+    """Walk there, again where somebody was in the way: whether one has come there."""
+    for _ in range(_TRIES):
+        yield Go(to)
+        if math.dist(me.xy, to) < _THERE_M:
+            return True
+        yield Wait(me.rng.uniform(1.0, 4.0))
+    return False
+
+
+def _stand_before(life: Life, me: Mover, xy: Xy) -> Generator[Task, None, bool]:
+    """Walk to a place beside this one and look at it: whether it is within reach."""
+    for _ in range(_TRIES):
+        spots = []
+        for turn in np.linspace(0, 2 * math.pi, 24, endpoint=False):
+            gap = me.rng.uniform(0.36, 0.46)
+            spot = (xy[0] + gap * math.cos(turn), xy[1] + gap * math.sin(turn))
+            if life.plan.contains(spot, 0.22) and life.tight_ways().is_free(spot):
+                spots.append(spot)
+        spot = spots[me.rng.integers(len(spots))] if spots else life.ways(me).nearest_free(xy)
+        yield Go(spot)
+        yield Face(xy)
+        yield Wait(me.rng.uniform(0.6, 1.4))
+        if math.dist(me.xy, xy) < _REACH_M:
+            return True
+    return False
+
+
+def _is_taken(life: Life, thing: Thing) -> bool:
+    """Whether something else lies where the thing is to be put."""
+    others = [other for other in life.room.things.values() if other is not thing]
+    return any(math.dist(thing.pose[:2], other.pose[:2]) < 0.6 * (thing.size + other.size) for other in others)
 
 
 def _by_the_wall(life: Life, size: float) -> Xy | None:
