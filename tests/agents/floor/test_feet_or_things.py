@@ -11,6 +11,7 @@ from floor_rooms import Room, thing, together, walker
 from tms_agents.floor import Appeared, FloorSettings, Scene
 from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
 from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.putting import count_feet
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
@@ -35,6 +36,20 @@ def told(prints: np.ndarray, *, robots: bool = False) -> bool:
     objects = Objects(empty(THING, 1), FloorSettings())
     objects.robot_at = NOW - 10.0 if robots else -math.inf
     return objects.ripe(prints, empty(BODY, 1), NOW, expected()) == [(0, OBJECT)]
+
+
+@pytest.mark.parametrize(("off", "counted"), [(0.3, 1.0), (0.17, 0.25), (0.1, 0.0)])
+def test_what_lies_close_to_one_of_two_feet_is_told_from_it_later_and_what_touches_it_never(
+    off: float, counted: float
+) -> None:
+    prints, bodies = resting(5.0), empty(BODY, 1)
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["a_print"], bodies["b_print"], bodies["a_seen"], bodies["b_seen"] = 1, 2, NOW, NOW
+    bodies["ax"], bodies["bx"] = prints["x"] - off, prints["x"] - off - 0.2
+    bodies["x"], bodies["y"] = prints["x"] - off - 0.1, prints["y"]
+    bodies["ay"] = bodies["by"] = prints["y"]
+    count_feet(prints, bodies, NOW, 1.0)
+    assert prints["spare"][0] == pytest.approx(counted)
 
 
 def test_what_is_as_wide_as_a_shoe_from_its_side_waits() -> None:
