@@ -16,6 +16,7 @@ from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.freespace import LOOK, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
+from tms_agents.floor.left_feet import take_back
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.own_feet import exchange
@@ -43,8 +44,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 9: who may have turned round in a door.
-_FORMAT = 9
+#: Of saved states; 10: for how long a print was all that was seen of somebody.
+_FORMAT = 10
 
 
 class FloorEstimator:
@@ -146,7 +147,8 @@ class FloorEstimator:
             self._association.decide()
         attend(prints, bodies, t, dt, self._association.scattered, self._shoes)
         scattered = self._association.scattered
-        if exchange(bodies, prints, t, scattered) + release(bodies, prints, t):
+        mended = exchange(bodies, prints, t, scattered) + release(bodies, prints, t)
+        if mended + take_back(bodies, prints, t, scattered):
             self._association.decide()
         count_feet(prints, bodies, t, dt)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):

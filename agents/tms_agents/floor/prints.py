@@ -47,6 +47,8 @@ _ALONE_S = 60.0
 _HIDES_M, _HIDES_S = 0.2, 6.0
 #: Why what is seen of somebody is no foot (`odd`): it is not like his feet; the other would be seen beside it.
 UNLIKE, ALONE = 1, 2
+#: Who showed another foot so lately (s) shows two.
+_BOTH_S = 0.5
 #: Who has moved so far (m) may be somebody.
 _WALKED_M = 0.15
 
@@ -134,7 +136,8 @@ def follow(
             q.last, q.silent = t, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
             q.attached = c.attached
-            q.owner, q.whose, q.owned, q.busy, q.revealed, q.given, q.idle = -1, -1, -1e9, -1e9, 0, 0, 0.0
+            q.owner, q.whose, q.owned, q.busy, q.revealed, q.given = -1, -1, -1e9, -1e9, 0, 0
+            q.idle, q.alone = 0.0, 0.0
         q = prints[j]
         off = np.hypot(c.x - q.x, c.y - q.y)
         if _grown(q, c):
@@ -269,6 +272,10 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
             if body.a_print == j or body.b_print == j:
                 q.owner, q.whose = b, body.label
                 q.owned = t
+                first = body.a_print == j
+                other, seen = (body.b_print, body.b_seen) if first else (body.a_print, body.a_seen)
+                if q.last == t:
+                    q.alone = 0.0 if other != j and t - seen < _BOTH_S else q.alone + dt
                 q.busy = t
             if body.stale:
                 continue

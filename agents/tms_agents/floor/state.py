@@ -14,6 +14,7 @@ import numpy as np
 #: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), whose (label
 #: of the last one, until owned), busy (when a body was last near),
 #: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
+#: alone (s for which it was all that was seen of its owner),
 #: revealed (`furniture.LOOKS`, `furniture.MOVED`), how bright it is (`shine.measure`) and of how many sightings,
 #: beams of the last sighting.
 PRINT = np.dtype(
@@ -43,6 +44,7 @@ PRINT = np.dtype(
         ("given", "i8"),
         ("spare", "f8"),
         ("idle", "f8"),
+        ("alone", "f8"),
         ("silent", "f8"),
         ("still_x", "f8"),
         ("still_y", "f8"),
