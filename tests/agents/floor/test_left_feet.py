@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from tms_agents.floor import FloorEstimator, Scene, Sensor
 from tms_agents.floor.left_feet import take_back
 from tms_agents.floor.prints import attend
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, empty
+from tms_agents.simulation.floor_world import FloorWorld
 
 NOW = 100.0
 LABEL = 7
@@ -100,3 +104,23 @@ def test_a_print_is_all_that_is_seen_of_him_while_the_other_foot_is_hidden(other
         bodies["b_seen"] = NOW + 0.1 * k - other_seen
         attend(prints, bodies, NOW + 0.1 * k, 0.1, expected(), np.zeros(2))
     assert prints["alone"][2] == pytest.approx(alone)
+
+
+@pytest.mark.parametrize(("seed", "until"), [(1422, 95.0), (1415, 126.0)])
+def test_who_stands_in_a_room_still_has_his_name_when_the_passer_has_gone_on(seed: int, until: float) -> None:
+    """In both somebody passes before the second one who stands there, and is taken for him for a moment."""
+    world = FloorWorld("standing", seed, feet="legs")
+    known = world.known()
+    sensors = {name: Sensor(mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
+    estimator = FloorEstimator(sensors, scene=Scene(region=known.region, gates=known.gates, seats=known.seats))
+    names: list[int] = []
+    for frame in world.scans():
+        estimator.scan(frame.sensor, frame.t, frame.ranges, frame.intensities)
+        if frame.t > until or (not names and frame.t > 60.0):
+            here = world.life.movers["p2"].xy
+            movers = [one for one in estimator.labels() if one.kind == "mover"]
+            names.append(min(movers, key=lambda one: math.dist(one.xy, here)).id)
+        if frame.t > until:
+            break
+    assert names[0] == names[1]
+    assert not [one for one in estimator.labels() if one.kind == "object" and math.dist(one.xy, here) < 0.2]
