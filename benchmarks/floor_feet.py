@@ -26,7 +26,7 @@ from floor_contestants import Ours
 from floor_landing import fit
 from numpy.typing import NDArray
 
-from tms_agents.floor.adopting import BLANK, adopt
+from tms_agents.floor.adopting import BLANK, adopt, complete
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.association import Association
 from tms_agents.floor.bodies import predict
@@ -154,7 +154,8 @@ class Told(Association):
                 if age < _FRESH_S:
                     self._note(clusters[i], cost[i], rows, columns[i] // 2, t - age)
         free = np.ones(count, np.bool_)
-        adopt(self.bodies, rows, columns, clusters, of, marks, BLANK, prints, t, sight, free)
+        adopt(self.bodies, rows, columns, clusters, of, marks, free, BLANK, prints, t, sight)
+        complete(self.bodies, rows, clusters, of, marks, free, BLANK, prints, t, sight)
         self.decide()
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return ~free

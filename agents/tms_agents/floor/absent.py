@@ -112,6 +112,8 @@ class Absent:
         """Those who did not turn up."""
         events: list[FloorEvent] = []
         for lost, wait_s in ((self._bodies, _WAIT_S), (self._turning, _TURNS_S + _BELIEVED_S)):
+            if not lost:
+                continue
             late = [one for one in lost if t - one["seen"] > wait_s]
             events += [Vanished(t, int(one["label"]), float(one["seen"]), t) for one in late]
             lost[:] = [one for one in lost if t - one["seen"] <= wait_s]

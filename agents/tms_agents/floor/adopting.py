@@ -33,26 +33,26 @@ def adopt(
     clusters: Any,
     of: NDArray[np.int64],
     marks: Array,
+    free: NDArray[np.bool_],
     blank: Any,
     prints: Any,
     t: float,
     sight: Any,
-    free: NDArray[np.bool_],
-) -> float:
-    """Let the clusters (m,) be the feet that ``columns`` (m,) says of the movers ``rows`` (k,): 2i and 2i + 1 of row i.
+) -> None:
+    """Let the clusters (m,) be the feet that ``columns`` (m,) say of the bodies ``rows`` (k,): 2i and 2i + 1 of row i.
 
-    ``free`` (m,) becomes which of them are nobody's. The negative log likelihood of not having seen those in view.
+    Of those that are ``free`` (m,); what is somebody's is so no more.
     """
-    free[:] = True
-    _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
-    _complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
-    unseen = missed(bodies, rows, t, sight)
-    expect(bodies, t, sight)
-    return float(unseen)
+    feet = _feet_of(columns, rows.size, free)
+    for column in range(rows.size):
+        a, b = feet[2 * column], feet[2 * column + 1]
+        _take(bodies[rows[column]], a, b, clusters, of, marks, blank, prints, t, sight)
 
 
 @njit(cache=True)
-def _apply(
+def adopt_from(
+    parent: Any,
+    first: NDArray[np.int64],
     bodies: Any,
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
@@ -64,45 +64,90 @@ def _apply(
     prints: Any,
     t: float,
     sight: Any,
-) -> None:
-    """Update the bodies ``rows`` (k,) with the clusters (m,) whose ``columns`` (m,) are their feet."""
-    k = rows.size
-    feet = np.full(2 * k, -1)
-    for i in range(clusters.size):
-        if free[i] and 0 <= columns[i] < 2 * k:
-            feet[columns[i]] = i
-            free[i] = False
-    for column in range(k):
-        a, b = feet[2 * column], feet[2 * column + 1]
-        for i in (a, b):
-            if i >= 0 and not clusters[i].cut:
-                learn(bodies[rows[column]], marks[i, 0], marks[i, 1])
-        one = clusters[a] if a >= 0 else blank[0]
-        two = clusters[b] if b >= 0 else blank[0]
-        body = bodies[rows[column]]
-        leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)
-        x, y, vx, vy, pp, pv, vv = body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv
-        update(
-            body,
-            one,
-            a >= 0,
-            of[a] if a >= 0 else -1,
-            marks[a, 2] if a >= 0 else 0.0,
-            two,
-            b >= 0,
-            of[b] if b >= 0 else -1,
-            marks[b, 2] if b >= 0 else 0.0,
-            (a < 0) != (b < 0) and together(body, clusters, max(a, b), t),
-            prints,
-            t,
-        )
-        if leaves:
-            body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv = x, y, vx, vy, pp, pv, vv
+    pool: Any,
+    seen: NDArray[np.int64],
+    last: NDArray[np.int64],
+    pooled: int,
+) -> int:
+    """As `adopt`, from the bodies of the ``parent`` into ``bodies`` (n,), without doing the same twice in a scan.
+
+    Whoever was the same (``first`` (n,): in that hypothesis) and has taken the same feet before is copied from the
+    ``pool``, in which so many are ``pooled``: how many are now. ``seen`` (pool, 4) says which those are: first, both
+    feet, and the one before of the same row; ``last`` (n,) the last of each row.
+    """
+    feet = _feet_of(columns, rows.size, free)
+    for column in range(rows.size):
+        row, a, b = rows[column], feet[2 * column], feet[2 * column + 1]
+        found = last[row]
+        while found >= 0 and not (seen[found, 0] == first[row] and seen[found, 1] == a and seen[found, 2] == b):
+            found = seen[found, 3]
+        if found >= 0:
+            bodies[row] = pool[found]
+            continue
+        bodies[row] = parent[row]
+        _take(bodies[row], a, b, clusters, of, marks, blank, prints, t, sight)
+        if pooled < pool.size:
+            pool[pooled] = bodies[row]
+            seen[pooled, 0], seen[pooled, 1], seen[pooled, 2], seen[pooled, 3] = first[row], a, b, last[row]
+            last[row] = pooled
+            pooled += 1
+    return pooled
 
 
 @njit(cache=True)
-def _complete(
+def _feet_of(columns: NDArray[np.int64], k: int, free: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The clusters (2k,) that are the feet of k bodies, -1 where none is; what was ``free`` (m,) is so no more."""
+    feet = np.full(2 * k, -1)
+    for i in range(columns.size):
+        if free[i] and 0 <= columns[i] < 2 * k:
+            feet[columns[i]] = i
+            free[i] = False
+    return feet
+
+
+@njit(cache=True)
+def _take(
+    body: Any,
+    a: int,
+    b: int,
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    blank: Any,
+    prints: Any,
+    t: float,
+    sight: Any,
+) -> None:
+    """The clusters a and b (-1: none) are the feet of the body."""
+    for i in (a, b):
+        if i >= 0 and not clusters[i].cut:
+            learn(body, marks[i, 0], marks[i, 1])
+    one = clusters[a] if a >= 0 else blank[0]
+    two = clusters[b] if b >= 0 else blank[0]
+    leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)
+    x, y, vx, vy, pp, pv, vv = body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv
+    update(
+        body,
+        one,
+        a >= 0,
+        of[a] if a >= 0 else -1,
+        marks[a, 2] if a >= 0 else 0.0,
+        two,
+        b >= 0,
+        of[b] if b >= 0 else -1,
+        marks[b, 2] if b >= 0 else 0.0,
+        (a < 0) != (b < 0) and together(body, clusters, max(a, b), t),
+        prints,
+        t,
+    )
+    if leaves:
+        body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv = x, y, vx, vy, pp, pv, vv
+
+
+@njit(cache=True)
+def complete(
     bodies: Any,
+    believed: NDArray[np.int64],
     clusters: Any,
     of: NDArray[np.int64],
     marks: Array,
@@ -111,8 +156,11 @@ def _complete(
     prints: Any,
     t: float,
     sight: Any,
-) -> None:
-    """What the believed movers have left goes to those not yet believed, and then begins new ones."""
+) -> float:
+    """What the movers that are ``believed`` (k,) have left goes to those who are not yet, and then begins new ones.
+
+    The negative log likelihood of not having seen those in view.
+    """
     m = clusters.size
     scratch = np.empty(bodies.size, np.int64)
     k = chosen(bodies, 0, scratch)
@@ -123,7 +171,7 @@ def _complete(
             cost = np.empty((m, 2 * k + m))
             costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
             assign(cost, columns)
-        _apply(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
+        adopt(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
     for i in range(m):
         c = clusters[i]
         if (
@@ -140,6 +188,9 @@ def _complete(
                 if _pushed(c, bodies, t):
                     bodies[b].from_furniture = 1
                 break
+    unseen = missed(bodies, believed, t, sight)
+    expect(bodies, t, sight)
+    return float(unseen)
 
 
 @njit(cache=True)

@@ -8,24 +8,33 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.adopting import BLANK, adopt, chosen
-from tms_agents.floor.assignment import assign
+from tms_agents.floor.adopting import BLANK, adopt_from, chosen, complete
+from tms_agents.floor.assignment import reassign, solve
 from tms_agents.floor.bodies import predict
 from tms_agents.floor.build import agree
 from tms_agents.floor.identity import christen, renamed, unite
-from tms_agents.floor.likelihood import UNLIKELY, costs, known
+from tms_agents.floor.likelihood import feet, known, nobodys
 from tms_agents.floor.shine import expected, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
-#: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and its parent's; new ones.
-_KEPT, _WORSE, _BRANCH, _CHILDREN = 12, 14.0, 7.0, 48
+#: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and its parent's.
+_KEPT, _WORSE, _BRANCH = 12, 14.0, 7.0
+#: Of a scan so many bodies that took the same feet are kept, to be copied.
+_POOL = 256
 #: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
 _NEAR_M, _ALIKE = 0.08, 0.3
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
 OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
 NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
+#: What has nothing to do with whose foot a cluster is.
+_BESIDES = (
+    *("told_x", "told_y", "told_at", "clear", "lone", "lone_x", "lone_y", "rest_x", "rest_y", "rest_at", "pushed"),
+    *("quality", "single", "still", "look", "look_n", "pace", "pace_n", "girth", "girth_n", "sole", "sole_n", "sure"),
+)
+_ALL = np.arange(len(BODY.names or ()))
+_FEET = np.array([index for index, field in enumerate(BODY.names or ()) if field not in _BESIDES])
 
 
 @njit(cache=True)
@@ -61,11 +70,26 @@ def _same(one: Any, two: Any, of: NDArray[np.int64]) -> bool:
 
 
 @njit(cache=True)
-def _copy(source: Any, source_belief: Array, target: Any, target_belief: Array) -> None:
-    """Copy the bodies that are used, and who they may be."""
+def _first_like(raw: NDArray[np.int64], fields: NDArray[np.int64], h: int, row: int) -> int:
+    """The first hypothesis in which the body ``row`` is exactly as in hypothesis h, in these fields of ``raw``."""
+    for g in range(h):
+        same = True
+        for field in fields:
+            if raw[g, row, field] != raw[h, row, field]:
+                same = False
+                break
+        if same:
+            return g
+    return h
+
+
+@njit(cache=True)
+def _copy(source: Any, source_belief: Array, target: Any, target_belief: Array, believed: bool) -> None:
+    """Copy the bodies that are used, and who they may be; those that are ``believed`` only if that is wanted."""
     for b in range(source.size):
         if source[b].used:
-            target[b] = source[b]
+            if believed or not source[b].confirmed:
+                target[b] = source[b]
             target_belief[b] = source_belief[b]
         else:
             target[b].used = 0
@@ -74,6 +98,7 @@ def _copy(source: Any, source_belief: Array, target: Any, target_belief: Array) 
 @njit(cache=True)
 def _advance(
     hypotheses: Any,
+    raw: NDArray[np.int64],
     spare: Any,
     beliefs: Array,
     spare_beliefs: Array,
@@ -84,6 +109,7 @@ def _advance(
     marks: Array,
     scattered: Array,
     blank: Any,
+    pool: Any,
     prints: Any,
     t: float,
     sight: Any,
@@ -91,67 +117,56 @@ def _advance(
 ) -> int:
     """One scan for all ``hypotheses`` (kept, n) of bodies, best first, with ``scores`` (kept,): how many there are.
 
-    ``taken`` (m,) becomes which clusters are somebody's in the best.
+    ``raw`` (kept, n, fields) are the same ``hypotheses`` as integers, ``pool`` is scratch for bodies. ``taken`` (m,)
+    becomes which clusters are somebody's in the best.
     """
     n, m = hypotheses.shape[1], clusters.size
-    rows = np.empty(n, np.int64)
-    child_score = np.full(_CHILDREN, np.inf)
-    child_parent = np.full(_CHILDREN, -1)
-    child_columns = np.full((_CHILDREN, max(m, 1)), -1)
-    children = 0
-    everything = np.ones(m, np.bool_)
+    most = count * (m + 1)
+    child_score, child_parent, child_columns = np.empty(most), np.empty(most, np.int64), np.full((most, m), -1)
+    first, alike = np.empty((count, n), np.int64), np.empty((count, n), np.int64)
     for h in range(count):
-        bodies = hypotheses[h]
-        predict(bodies, t)
-        k = chosen(bodies, 1, rows)
-        if m == 0 or k == 0:
-            if children < _CHILDREN:
-                child_score[children], child_parent[children] = scores[h], h
-                children += 1
-            continue
-        cost = np.empty((m, 2 * k + m))
-        costs(clusters, of, marks, everything, prints, bodies, rows[:k], t, cost)
-        known(clusters, bodies, t, cost[:, 2 * k :])
-        columns = np.full(m, -1)
-        best = assign(cost, columns)
-        if children < _CHILDREN:
-            child_score[children], child_parent[children] = scores[h] + best, h
-            child_columns[children] = columns
-            children += 1
-        other = np.full(m, -1)
-        for i in range(m):
-            mine = columns[i] // 2
-            if columns[i] >= 2 * k or children >= _CHILDREN:
-                continue
-            rival = False
-            for j in range(2 * k + m):
-                if j // 2 != mine and cost[i, j] < cost[i, columns[i]] + 2.0 * _BRANCH:
-                    rival = True
-            if not rival:
-                continue
-            one, two = cost[i, 2 * mine], cost[i, 2 * mine + 1]
-            cost[i, 2 * mine], cost[i, 2 * mine + 1] = UNLIKELY, UNLIKELY
-            total = assign(cost, other)
-            cost[i, 2 * mine], cost[i, 2 * mine + 1] = one, two
-            if total - best < _BRANCH:
-                child_score[children], child_parent[children] = scores[h] + total, h
-                child_columns[children] = other
-                children += 1
-    other_of, scratch = np.empty(n, np.int64), np.empty((2, n))
+        predict(hypotheses[h], t)
+        for b in range(n):
+            if hypotheses[h, b].used:
+                first[h, b] = _first_like(raw, _ALL, h, b)
+                alike[h, b] = _first_like(raw, _FEET, h, b)
+    children = _propose(
+        hypotheses, alike, scores, clusters, of, marks, prints, t, child_score, child_parent, child_columns
+    )
+    rows, other_of, scratch = np.empty(n, np.int64), np.empty(n, np.int64), np.empty((2, n))
     owned, free = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_), np.ones(m, np.bool_)
+    seen, last = np.empty((pool.size, 4), np.int64), np.full(n, -1)
     order = np.argsort(child_score[:children])
-    kept = 0
+    kept, pooled = 0, 0
     least = child_score[order[0]]
     for o in order:
         if kept == hypotheses.shape[0] or child_score[o] > least + _WORSE:
             break
-        bodies = spare[kept]
-        parent = hypotheses[child_parent[o]]
-        _copy(parent, beliefs[child_parent[o]], bodies, spare_beliefs[kept])
-        k = chosen(bodies, 1, rows)
-        unseen = adopt(bodies, rows[:k], child_columns[o], clusters, of, marks, blank, prints, t, sight, free)
+        bodies, parent = spare[kept], child_parent[o]
+        _copy(hypotheses[parent], beliefs[parent], bodies, spare_beliefs[kept], False)
+        k = chosen(hypotheses[parent], 1, rows)
+        free[:] = True
+        pooled = adopt_from(
+            hypotheses[parent],
+            first[parent],
+            bodies,
+            rows[:k],
+            child_columns[o],
+            clusters,
+            of,
+            marks,
+            free,
+            blank,
+            prints,
+            t,
+            sight,
+            pool,
+            seen,
+            last,
+            pooled,
+        )
+        score = child_score[o] - least + complete(bodies, rows[:k], clusters, of, marks, free, blank, prints, t, sight)
         known_already = False
-        score = child_score[o] - least + unseen
         for j in range(kept):
             if _same(spare[j], bodies, other_of):
                 worse = score - scores[j]
@@ -167,7 +182,7 @@ def _advance(
     best = int(np.argmin(scores[:kept]))
     for h in range(kept):
         source = best if h == 0 else (0 if h == best else h)
-        _copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h])
+        _copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h], True)
     scores[0], scores[best] = scores[best], scores[0]
     scores[:kept] -= scores[0]
     for i in range(m):
@@ -175,11 +190,74 @@ def _advance(
     return kept
 
 
+@njit(cache=True)
+def _propose(
+    hypotheses: Any,
+    alike: NDArray[np.int64],
+    scores: Array,
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    prints: Any,
+    t: float,
+    child_score: Array,
+    child_parent: NDArray[np.int64],
+    child_columns: NDArray[np.int64],
+) -> int:
+    """How each hypothesis may go on: the best assignment, and the best in which one cluster is not who it is there.
+
+    ``alike`` (count, n) is in which hypothesis each body was the same first, for `feet`: most people are the same in
+    all. Fills what children there are, their score, parent and columns; how many.
+    """
+    count, n, m = alike.shape[0], hypotheses.shape[1], clusters.size
+    rows = np.empty(n, np.int64)
+    everything, columns, other = np.ones(m, np.bool_), np.empty(m, np.int64), np.empty(m, np.int64)
+    top = 0
+    for h in range(count):
+        k = chosen(hypotheses[h], 1, rows)
+        top = max(top, rows[k - 1] + 1 if k else 0)
+    told = np.empty((count, top, m, 2))
+    children = 0
+    for h in range(count):
+        bodies = hypotheses[h]
+        k = chosen(bodies, 1, rows)
+        if m == 0 or k == 0:
+            child_score[children], child_parent[children] = scores[h], h
+            children += 1
+            continue
+        cost = np.empty((m, 2 * k + m))
+        for column in range(k):
+            row = rows[column]
+            like = alike[h, row]
+            if like == h:
+                feet(clusters, of, marks, everything, prints, bodies, row, t, told[h, row])
+            cost[:, 2 * column : 2 * column + 2] = told[like, row]
+        nobodys(clusters, of, prints, bodies, rows[:k], t, cost[:, 2 * k :])
+        known(clusters, bodies, t, cost[:, 2 * k :])
+        of_column, u, v = np.empty(2 * k + m, np.int64), np.empty(m), np.empty(2 * k + m)
+        best = solve(cost, columns, of_column, u, v)
+        child_score[children], child_parent[children] = scores[h] + best, h
+        child_columns[children] = columns
+        children += 1
+        for i in range(m):
+            if columns[i] >= 2 * k:
+                continue
+            total = reassign(cost, columns, of_column, u, v, i, columns[i] // 2 * 2, 1.01 * _BRANCH, other)
+            if total - best < _BRANCH:
+                child_score[children], child_parent[children] = scores[h] + total, h
+                child_columns[children] = other
+                children += 1
+    return children
+
+
 class Association:
     """The hypotheses about who is where; the best is ``bodies`` (n,) of `state.BODY`."""
 
     def __init__(self, most: int) -> None:
         self._hypotheses, self._spare = empty(BODY, (_KEPT, most)), empty(BODY, (_KEPT, most))
+        self._pool = empty(BODY, _POOL)
+        # All fields are as long as an integer: what is the same to the last bit is found by these.
+        self._raw = self._hypotheses.view(np.int64).reshape(_KEPT, most, -1)
         self._beliefs, self._spare_beliefs = np.zeros((_KEPT, most, most)), np.zeros((_KEPT, most, most))
         self._beliefs[:] = np.eye(most)
         self._names = np.zeros(most, np.int64)
@@ -195,6 +273,7 @@ class Association:
         taken = np.zeros(clusters.size, np.bool_)
         self._count = _advance(
             self._hypotheses,
+            self._raw,
             self._spare,
             self._beliefs,
             self._spare_beliefs,
@@ -205,6 +284,7 @@ class Association:
             marks,
             self.scattered,
             BLANK,
+            self._pool,
             prints,
             t,
             sight,

@@ -71,6 +71,9 @@ def _classify(
         if np.isinf(r):
             states[i] = NO_ECHO
             continue
+        states[i] = BACKGROUND
+        if _steady(centre, sigma, weight, missing, least, sigmas, threshold, i, r):
+            continue
         state = UNKNOWN
         gone = True
         lowest, highest = np.inf, 0.0
@@ -101,6 +104,26 @@ def _classify(
             else:
                 state = BEYOND
         states[i] = state
+
+
+@njit(cache=True)
+def _steady(
+    centre: Array,
+    sigma: Array,
+    weight: Array,
+    missing: Array,
+    least: float,
+    sigmas: float,
+    threshold: float,
+    i: int,
+    r: float,
+) -> bool:
+    """Whether the range r of beam i is near a component of its own that has not gone: so it is mostly."""
+    for j in range(centre.shape[1]):
+        near = abs(r - centre[i, j]) <= max(threshold, sigmas * sigma[i, j])
+        if weight[i, j] > least and near and not missing[i, j] > _GONE_S:
+            return True
+    return False
 
 
 @njit(cache=True)

@@ -131,11 +131,14 @@ def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, sho
                 shoes[0] += ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - shoes[0]) / shoes[1]
 
 
+@njit(cache=True)
 def agree(bodies: Any, shoes: NDArray[np.float64]) -> None:
-    """Let all ``bodies`` show what is known to be seen, shoes or legs; ``shoes`` (2,) is what `count_shoes` learns."""
+    """All ``bodies`` (kept, n) show what is seen here, shoes or legs; ``shoes`` (2,) is what `count_shoes` learns."""
     if shoes[1] < _PLENTY:
         return
-    if shoes[0] > _ALL_SHOES:
-        np.maximum(bodies["shoe"], SHOES, out=bodies["shoe"])
-    elif shoes[0] < _ALL_LEGS:
-        np.minimum(bodies["shoe"], 0.5 * SHOES, out=bodies["shoe"])
+    for h in range(bodies.shape[0]):
+        for b in range(bodies.shape[1]):
+            if bodies[h, b].used and shoes[0] > _ALL_SHOES:
+                bodies[h, b].shoe = max(bodies[h, b].shoe, SHOES)
+            elif bodies[h, b].used and shoes[0] < _ALL_LEGS:
+                bodies[h, b].shoe = min(bodies[h, b].shoe, 0.5 * SHOES)

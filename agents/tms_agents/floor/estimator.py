@@ -13,7 +13,7 @@ from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.build import count_shoes, legs
 from tms_agents.floor.dark import dark_width
 from tms_agents.floor.events import FloorEvent, FloorLabel
-from tms_agents.floor.freespace import LOOK, guard, look
+from tms_agents.floor.freespace import LOOK, claim, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.left_feet import take_back
@@ -214,15 +214,12 @@ class FloorEstimator:
         if not view.background.learned:
             view.claimed[:] = False
             return
-        for k in range(clusters.size):
-            q = self._prints[of[k]]
-            beams = slice(int(clusters["first"][k]), int(clusters["last"][k]) + 1)
-            if q["revealed"]:
-                span = np.arange(beams.start, beams.stop)
-                span = span[(view.background.states[span] == FOREGROUND) & ~view.claimed[span]]
-                view.background.adopt(span, view.ranges[span], ADOPTED[q["revealed"]])
-            elif somebodys[k] or (q["hits"] >= 3 and q["hits"] > 0.6 * q["looks"]):
-                view.claimed[beams] = True
+        k = 0
+        while (k := claim(clusters, of, self._prints, somebodys, k, view.claimed)) < clusters.size:
+            span = np.arange(int(clusters["first"][k]), int(clusters["last"][k]) + 1)
+            span = span[(view.background.states[span] == FOREGROUND) & ~view.claimed[span]]
+            view.background.adopt(span, view.ranges[span], ADOPTED[self._prints["revealed"][of[k]]])
+            k += 1
         guard(view.ranges, view.background.states, view.claimed)
 
     def _new_label(self) -> int:
@@ -251,7 +248,7 @@ class FloorEstimator:
             "strides": self._tracks.strides,
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
-            "visitors": [[k, sorted(v.items())] for k, v in self._objects.visitors.items()],
+            "visitors": self._objects.visitors.save(self._objects.things),
             "waiting": [[k, rested, who] for k, (rested, who) in self._objects.waiting.items()],
             "robot_at": self._objects.robot_at if np.isfinite(self._objects.robot_at) else None,
             "furniture": self._furniture.save(),
@@ -294,7 +291,7 @@ class FloorEstimator:
             self._tracks.strides = [(float(t), float(x), float(y), float(u)) for t, x, y, u in state.get("strides", ())]
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)
-            self._objects.visitors = {int(k): {int(m): float(d) for m, d in v} for k, v in state["visitors"]}
+            self._objects.visitors.restore(self._objects.things, state["visitors"])
             self._objects.waiting = {
                 int(k): (float(rested), tuple((int(m), float(p)) for m, p in who))
                 for k, rested, who in state.get("waiting", ())

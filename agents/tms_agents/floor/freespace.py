@@ -297,6 +297,28 @@ def vacant(
 
 
 @njit(cache=True)
+def claim(
+    clusters: Any,
+    of: NDArray[np.int64],
+    prints: Any,
+    somebodys: NDArray[np.bool_],
+    start: int,
+    claimed: NDArray[np.bool_],
+) -> int:
+    """Mark the beams that are somebody or something as ``claimed`` (n,), from cluster ``start`` on.
+
+    The first cluster that has turned out to be furniture ends it, which is told; else it is how many there are.
+    """
+    for k in range(start, clusters.size):
+        c, q = clusters[k], prints[of[k]]
+        if q.revealed:
+            return k
+        if somebodys[k] or (q.hits >= 3 and q.hits > 0.6 * q.looks):
+            claimed[c.first : c.last + 1] = True
+    return int(clusters.size)
+
+
+@njit(cache=True)
 def guard(ranges: Array, states: NDArray[np.int8], claimed: NDArray[np.bool_]) -> None:
     """Extend ``claimed`` (n,) to what is beside it: at the edge of a thing a beam shows a bit of what is behind, too.
 

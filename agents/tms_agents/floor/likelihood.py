@@ -184,6 +184,23 @@ def costs(
     a step: what has stood there for long is no foot. The last m columns are for clusters that are nobody's: a fresh
     one is somebody new, which is rare; an old one may well be something that was put down.
     """
+    k = rows.size
+    for column in range(k):
+        feet(clusters, of, marks, free, prints, bodies, rows[column], t, cost[:, 2 * column : 2 * column + 2])
+    nobodys(clusters, of, prints, bodies, rows, t, cost[:, 2 * k :])
+
+
+@njit(cache=True)
+def nobodys(
+    clusters: Any,
+    of: NDArray[np.int64],
+    prints: Any,
+    bodies: Any,
+    rows: NDArray[np.int64],
+    t: float,
+    cost: Array,
+) -> None:
+    """Fill ``cost`` (m, m): on its diagonal what it costs that a cluster is a foot of none of the bodies ``rows``."""
     m, k = clusters.size, rows.size
     shod = False
     for column in range(k):
@@ -191,9 +208,8 @@ def costs(
     for i in range(m):
         c = clusters[i]
         cost[i, :] = UNLIKELY
-        q = prints[of[i]] if of[i] >= 0 else prints[0]
-        age = t - q.first if of[i] >= 0 else 0.0
-        cost[i, 2 * k + i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
+        age = t - prints[of[i]].first if of[i] >= 0 else 0.0
+        cost[i, i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
         if age > _FRESH_S and c.width < WIDE_M and not narrow(c) and not c.attached:
             # What was nobody's stays nobody's.
             stands = False
@@ -203,115 +219,134 @@ def costs(
                 part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
                 stands = stands or part
             if not stands:
-                cost[i, 2 * k + i] = _RESTS
+                cost[i, i] = _RESTS
         if _part(clusters, i, LONGEST_SHOE_M if shod else _LEG_M):
-            cost[i, 2 * k + i] = min(cost[i, 2 * k + i], _PART)
-        if not free[i]:
-            continue
-        for column in range(k):
-            body = bodies[rows[column]]
-            away = np.hypot(c.x - body.x, c.y - body.y)
-            if body.stale and age > _FRESH_S and not waits(body, c):
-                continue
-            if of[i] >= 0 and lay_before(q, body):
-                continue
-            if not body.confirmed and of[i] >= 0 and q.rested < body.first - 0.25:
-                continue
-            if not body.confirmed and _strides(body, c) > LONGEST_M:
-                continue
-            if away > _REACH_M + 1.5 * np.sqrt(body.pp):
-                continue
-            if body.robot or body.wide > 0.6:
-                # One that is seen does not jump to another that stands beside it.
-                jumps = body.machine and t - body.seen < _STAYS_S
-                if away > (0.5 * body.far + _BESIDE_M if jumps else _ROBOT_M):
-                    continue
-                # Part of it may be hidden, but what is narrow and all in view is somebody's foot.
-                # What is left of it at the edge of a door is no measure.
-                least = max(0.6 * body.width, _NARROWEST * body.far if body.machine else 0.0)
-                cost[i, 2 * column] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > least else 6.0)
-                continue
-            lately = of[i] >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
-            speed = np.hypot(body.vx, body.vy)
-            base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
-            shape = unlike(body, marks[i])
-            if c.width > WIDE_M:
-                shape += 3.0
-                if c.width > _BROAD_M and body.hits > 15:
-                    shape += 5.0 * max(0.0, 1.0 - 3.0 * body.wide)
-            elif narrow(c):
-                shape += 2.0 if c.n == 1 else 6.0
-            if c.attached:
-                shape += 4.0
-            shape += _stouter(body, c) + _another_shoe(body, c)
-            broad = too_wide(body, c)
-            anywhere = (
-                _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
-            )
-            anywhere = min(anywhere, 0.5 * away * away / (0.45**2 + body.pp) + 5.2)
-            if age > 0.5:
-                anywhere += 1.0
-            for which in range(2):
-                if which == 0:
-                    x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
-                    ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
-                    landed, beside = body.b_land, body.b_print
-                    left = t - body.a_since > _LEFT_S and t - body.b_since < _FRESH_S
-                else:
-                    x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
-                    ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
-                    landed, beside = body.a_land, body.a_print
-                    left = t - body.b_since > _LEFT_S and t - body.a_since < _FRESH_S
-                gap = t - seen
-                off = (c.x - x) ** 2 + (c.y - y) ** 2
-                value = UNLIKELY
-                if standing >= 0 and standing == of[i]:
-                    value = base + min(0.5 * off / STAND_M**2, 2.0) + (_LEFT if left else 0.0)
-                elif gap < 1.0 or body.stale:
-                    value = base + 0.5 * off / STAND_M**2
-                if body.shoe >= SHOES:
-                    if gap < 0.35:
-                        value = min(value, base + 0.5 * off / _ROLL_M**2 + 1.0 if off < _ROLLED_M**2 else UNLIKELY)
-                elif gap < 0.35:
-                    swing = base + _swinging(c.x - x, c.y - y, u, v, body, speed, gap)
-                    if swings > 0.5 and t - other < 0.22:
-                        swing += _BOTH
-                    value = min(value, swing)
-                if broad > 0.0 and t - other < 0.2 and np.hypot(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
-                    value += broad
-                step = anywhere
-                if body.shoe >= SHOES:
-                    step = landing(body, c, ox, oy, seen, landed, t - age)
-                elif gap < 0.22 and not left:
-                    # Seen just now, it cannot be far, unless it was something that was left behind.
-                    step += _SEEN + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / 0.1) ** 2
-                elif gap > 1.0 and not left:
-                    # It must be somewhere.
-                    step -= 1.0
-                if left:
-                    step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
-                if age > gap + 0.15 and (not lately or (body.shoe >= SHOES and beside == of[i])):
-                    # Whatever stands here came while this foot was somewhere else.
-                    step += _STOLEN
-                if age >= _FRESH_S and q.owner != rows[column] and not lately:
-                    # What has stood there for long is hardly a foot, except that of somebody who stands.
-                    value = min(value, step + 2.5)
-                else:
-                    value = min(value, step)
-                    if body.shoe < SHOES and speed > 0.35 and gap < 1.3 and t - other < 0.4:
-                        side = body.side if which == 0 else -body.side
-                        value = min(value, _strides_on(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
-                cost[i, 2 * column + which] = shape + value
-    # Both feet in one cluster: whatever else is near is not a foot of this body.
-    for column in range(k):
-        body = bodies[rows[column]]
-        for i in range(m):
-            if free[i] and together(body, clusters, i, t):
-                for o in range(m):
-                    if o != i:
-                        cost[o, 2 * column] += 4.0
-                        cost[o, 2 * column + 1] += 4.0
-                break
+            cost[i, i] = min(cost[i, i], _PART)
+
+
+@njit(cache=True)
+def feet(
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    prints: Any,
+    bodies: Any,
+    row: int,
+    t: float,
+    cost: Array,
+) -> None:
+    """Fill ``cost`` (m, 2): what it costs that the clusters (m,) that are ``free`` are the feet of the body ``row``."""
+    body = bodies[row]
+    for i in range(clusters.size):
+        cost[i, :] = UNLIKELY
+        if free[i]:
+            _foot(clusters[i], of[i], marks[i], prints, body, row, t, cost[i])
+    for i in range(clusters.size):
+        if free[i] and together(body, clusters, i, t):
+            # Both feet in one cluster: whatever else is near is not a foot of this body.
+            for o in range(clusters.size):
+                if o != i:
+                    cost[o, 0] += 4.0
+                    cost[o, 1] += 4.0
+            break
+
+
+@njit(cache=True)
+def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t: float, cost: Array) -> None:
+    """Lower ``cost`` (2,) to that of the cluster c, on ``print_`` (-1: none), being the first and the second foot."""
+    away = np.hypot(c.x - body.x, c.y - body.y)
+    if away > _REACH_M + 1.5 * np.sqrt(body.pp):
+        return
+    q = prints[print_] if print_ >= 0 else prints[0]
+    age = t - q.first if print_ >= 0 else 0.0
+    if body.stale and age > _FRESH_S and not waits(body, c):
+        return
+    if print_ >= 0 and lay_before(q, body):
+        return
+    if not body.confirmed and print_ >= 0 and q.rested < body.first - 0.25:
+        return
+    if not body.confirmed and _strides(body, c) > LONGEST_M:
+        return
+    if body.robot or body.wide > 0.6:
+        # One that is seen does not jump to another that stands beside it.
+        jumps = body.machine and t - body.seen < _STAYS_S
+        if away > (0.5 * body.far + _BESIDE_M if jumps else _ROBOT_M):
+            return
+        # Part of it may be hidden, but what is narrow and all in view is somebody's foot.
+        # What is left of it at the edge of a door is no measure.
+        least = max(0.6 * body.width, _NARROWEST * body.far if body.machine else 0.0)
+        cost[0] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > least else 6.0)
+        return
+    lately = print_ >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
+    speed = np.hypot(body.vx, body.vy)
+    base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
+    shape = unlike(body, marks)
+    if c.width > WIDE_M:
+        shape += 3.0
+        if c.width > _BROAD_M and body.hits > 15:
+            shape += 5.0 * max(0.0, 1.0 - 3.0 * body.wide)
+    elif narrow(c):
+        shape += 2.0 if c.n == 1 else 6.0
+    if c.attached:
+        shape += 4.0
+    shape += _stouter(body, c) + _another_shoe(body, c)
+    broad = too_wide(body, c)
+    anywhere = _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
+    anywhere = min(anywhere, 0.5 * away * away / (0.45**2 + body.pp) + 5.2)
+    if age > 0.5:
+        anywhere += 1.0
+    for which in range(2):
+        if which == 0:
+            x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
+            ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
+            landed, beside = body.b_land, body.b_print
+            left = t - body.a_since > _LEFT_S and t - body.b_since < _FRESH_S
+        else:
+            x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
+            ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
+            landed, beside = body.a_land, body.a_print
+            left = t - body.b_since > _LEFT_S and t - body.a_since < _FRESH_S
+        gap = t - seen
+        off = (c.x - x) ** 2 + (c.y - y) ** 2
+        value = UNLIKELY
+        if standing >= 0 and standing == print_:
+            value = base + min(0.5 * off / STAND_M**2, 2.0) + (_LEFT if left else 0.0)
+        elif gap < 1.0 or body.stale:
+            value = base + 0.5 * off / STAND_M**2
+        if body.shoe >= SHOES:
+            if gap < 0.35:
+                value = min(value, base + 0.5 * off / _ROLL_M**2 + 1.0 if off < _ROLLED_M**2 else UNLIKELY)
+        elif gap < 0.35:
+            swing = base + _swinging(c.x - x, c.y - y, u, v, body, speed, gap)
+            if swings > 0.5 and t - other < 0.22:
+                swing += _BOTH
+            value = min(value, swing)
+        if broad > 0.0 and t - other < 0.2 and np.hypot(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
+            value += broad
+        step = anywhere
+        if body.shoe >= SHOES:
+            step = landing(body, c, ox, oy, seen, landed, t - age)
+        elif gap < 0.22 and not left:
+            # Seen just now, it cannot be far, unless it was something that was left behind.
+            step += _SEEN + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / 0.1) ** 2
+        elif gap > 1.0 and not left:
+            # It must be somewhere.
+            step -= 1.0
+        if left:
+            step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
+        if age > gap + 0.15 and (not lately or (body.shoe >= SHOES and beside == print_)):
+            # Whatever stands here came while this foot was somewhere else.
+            step += _STOLEN
+        if age >= _FRESH_S and q.owner != row and not lately:
+            # What has stood there for long is hardly a foot, except that of somebody who stands.
+            value = min(value, step + 2.5)
+        else:
+            value = min(value, step)
+            if body.shoe < SHOES and speed > 0.35 and gap < 1.3 and t - other < 0.4:
+                side = body.side if which == 0 else -body.side
+                value = min(value, _strides_on(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
+        cost[which] = shape + value
 
 
 @njit(cache=True)

@@ -9,13 +9,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.candidates import FAR_M, candidates, near_movers
+from tms_agents.floor.candidates import candidates, near_movers
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.own_feet import may_be_his
 from tms_agents.floor.patience import patience
 from tms_agents.floor.prints import HARDLY, lay_before
 from tms_agents.floor.settings import FloorSettings
+from tms_agents.floor.visitors import Visitors
 
 Array = NDArray[np.float64]
 
@@ -256,14 +257,22 @@ def _ripe(
     return count
 
 
+@njit(cache=True)
+def _any_robot(bodies: Any) -> bool:
+    """Whether one of a size that robots have is there."""
+    found = False
+    for b in range(bodies.size):
+        found |= bodies[b].used == 1 and bodies[b].machine == 1
+    return found
+
+
 class Objects:
     """Objects: the used ones of ``things``, their labels and events."""
 
     def __init__(self, things: Any, settings: FloorSettings) -> None:
         self.things = things
         self._settings = settings
-        #: For each object not seen now: label of a mover -> how near (m) it has been since the object was last seen.
-        self.visitors: dict[int, dict[int, float]] = {}
+        self.visitors = Visitors(things.size)
         #: For each print that waits: since when it has rested, and who was near when it seemed to be a thing.
         self.waiting: dict[int, tuple[float, Candidates]] = {}
         #: When there was a robot.
@@ -275,7 +284,7 @@ class Objects:
     def weigh(self, looks: Any, bodies: Any, t: float, dt: float) -> list[FloorEvent]:
         """Take in what a scan says (`freespace.look`) of each thing: removals."""
         waiting = _weigh(self.things, looks, t, dt)
-        self._attend(bodies, t)
+        self.visitors.attend(self.things, bodies, t)
         events: list[FloorEvent] = []
         self.walked = []
         if not waiting:
@@ -283,7 +292,7 @@ class Objects:
         due = (self.things["used"] == 1) & (self.things["free"] >= self._settings.free_s - 0.05)
         for index in np.flatnonzero(due & (self.things["doubt"] >= _SURE - 1e-9)).tolist():
             thing = self.things[index]
-            who = candidates(self.visitors.pop(int(thing["label"]), {}))
+            who = candidates(self.visitors.of(index))
             events.append(Vanished(t, int(thing["label"]), float(thing["seen"]), t, who))
             thing["used"] = 0
             if not who:
@@ -295,7 +304,7 @@ class Objects:
 
         ``scattered`` (3,) is what `shine.scatter` has learned.
         """
-        if (bodies["used"] & bodies["machine"]).any():
+        if _any_robot(bodies):
             self.robot_at = t
         s = self._settings
         if self._ripe.size != prints.size:
@@ -329,6 +338,7 @@ class Objects:
         if thing["used"]:
             return []
         thing["used"], thing["label"] = 1, label
+        self.visitors.forget(slot)
         thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
@@ -359,26 +369,6 @@ class Objects:
             for thing in self.things
             if thing["used"]
         ]
-
-    def _attend(self, bodies: Any, t: float) -> None:
-        """Remember who came near an object while it was not seen: that is who may have taken it."""
-        used = np.flatnonzero(self.things["used"] == 1)
-        present = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1))
-        dx = np.subtract.outer(self.things["x"][used], bodies["x"][present])
-        dy = np.subtract.outer(self.things["y"][used], bodies["y"][present])
-        away = np.hypot(dx, dy)
-        movers = bodies["label"][present].tolist()
-        rows = zip(self.things["label"][used].tolist(), self.things["seen"][used].tolist(), away.tolist(), strict=True)
-        for label, seen, gaps in rows:
-            near = [(gap, mover) for gap, mover in zip(gaps, movers, strict=True) if gap < FAR_M]
-            if seen == t:
-                # Whoever was near when it was last seen: kept from this scan on.
-                self.visitors.pop(label, None)
-                if not near:
-                    continue
-            visitors = self.visitors.setdefault(label, {})
-            for gap, mover in near:
-                visitors[mover] = min(gap, visitors.get(mover, math.inf))
 
 
 def _xy(thing: Any) -> tuple[float, float]:

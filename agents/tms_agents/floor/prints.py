@@ -242,14 +242,13 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
                 body.odd = UNLIKE
             if shod and _hides_none(prints[j], min(body.a_seen, body.b_seen), t):
                 body.odd = ALONE
+        if body.a_print >= 0 and not prints[body.a_print].used:
+            body.a_print = -1
+        if body.b_print >= 0 and not prints[body.b_print].used:
+            body.b_print = -1
     for j in range(prints.size):
         q = prints[j]
         if not q.used:
-            for b in range(bodies.size):
-                if bodies[b].a_print == j:
-                    bodies[b].a_print = -1
-                if bodies[b].b_print == j:
-                    bodies[b].b_print = -1
             continue
         q.owner = -1
         nobodys = q.last == t

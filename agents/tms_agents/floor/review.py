@@ -66,6 +66,9 @@ _BEGAN_M, _STILL_THERE_M = 0.03, 0.12
 _PUT_M, _PUT_S = 1.2, 3.0
 #: Places on the way of one who is hidden that are looked at: so many, so far apart (m).
 _LOOKS, _LOOK_M = 4, 0.5
+#: Two of whom so near each other (m) one foot alone is seen are one, if the younger has shown two in less than this
+#: share of the scans.
+_UNITE_M, _BOTH = 0.45, 0.25
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 
@@ -301,3 +304,38 @@ def review(
             actions[b] = GONE
         elif unseen > stale_s and not body.stale:
             actions[b] = LOST
+
+
+@njit(cache=True)
+def unseen(bodies: Any, since: float, rows: NDArray[np.int64]) -> int:
+    """Fill ``rows`` (n,) with the movers, not yet stale, that were not seen ``since`` then: how many there are."""
+    count = 0
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and body.confirmed and not body.stale and body.seen < since:
+            rows[count] = b
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def doubled(bodies: Any) -> int:
+    """A mover that is another one, with one foot each at one place: the younger; -1 if there is none."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        if not (body.used and body.confirmed and body.single > 0.5 and body.both < _BOTH * body.hits):
+            continue
+        for o in range(bodies.size):
+            other = bodies[o]
+            lone = other.used and other.confirmed and other.single > 0.5 and other.label < body.label
+            if lone and np.hypot(other.x - body.x, other.y - body.y) < _UNITE_M:
+                return b
+    return -1
+
+
+@njit(cache=True)
+def tell(bodies: Any, index: int, t: float) -> tuple[int, float, float, float]:
+    """(label, x m, y m, variance m²) of the mover, and remember that it is told at t."""
+    body = bodies[index]
+    body.told_x, body.told_y, body.told_at = body.x, body.y, t
+    return body.label, body.x, body.y, body.pp

@@ -11,9 +11,21 @@ import numpy as np
 from tms_agents.floor.absent import Absent
 from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
-from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.masks import Area
-from tms_agents.floor.review import BACK, CONFIRM, GONE, LOST, has_walked, is_footless, review
+from tms_agents.floor.review import (
+    BACK,
+    CONFIRM,
+    GONE,
+    LOST,
+    NOTHING,
+    doubled,
+    has_walked,
+    is_footless,
+    review,
+    tell,
+    unseen,
+)
 from tms_agents.floor.settings import FloorSettings, Scene
 
 #: How much what is seen next of somebody lost must look like feet.
@@ -26,8 +38,6 @@ _NEW_S = 30.0
 _PUSHED_M = 2.0
 #: What has moved with people beside it for less than this share of the way has moved by itself.
 _ALONE = 0.3
-#: Two of them so near each other (m) are one, if the younger has shown two feet in less than this share of the scans.
-_UNITE_M, _BOTH = 0.45, 0.25
 #: A seated person's feet vanish so near the seat (m), and those of somebody who goes where nobody is looked for.
 _SEAT_M, _MASK_M = 0.45, 0.5
 #: A foot is where it was seen so long (s) before the last one.
@@ -59,7 +69,7 @@ class Tracks:
         self.absent = Absent(self._gates, self._region)
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
-        self._actions = np.zeros(self.bodies.size, np.int64)
+        self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
 
     def review(
         self,
@@ -95,22 +105,24 @@ class Tracks:
         self._believe_steps(t)
         self._association.rename(t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t)
-        for index in np.flatnonzero(self._actions).tolist():
-            body, action = self.bodies[index], self._actions[index]
+        for index, action in enumerate(self._actions.tolist()):
+            if action == NOTHING:
+                continue
+            body = self.bodies[index]
             if action == GONE:
                 events += self._gone(index, t)
             elif action == LOST:
                 events += self._lost(index, t)
             elif action == BACK:
                 body["stale"] = 0
-                events.append(Back(t, int(body["label"]), _xy(body)))
-                _told(body, t)
+                label, xy, _ = self._tell(index, t)
+                events.append(Back(t, label, xy))
             elif action == CONFIRM:
                 events += self._confirm(index, t, new_label, was_furniture)
             elif (
-                (body["wide"] > 0.5 or is_footless(body))
-                and t - body["first"] < _NEW_S
+                t - body["first"] < _NEW_S
                 and body["from_furniture"] == 0
+                and (body["wide"] > 0.5 or is_footless(body))
                 and (body["pushed"] > 0.8 or was_furniture(body))
             ):
                 # Furniture that is pushed is seen to be missing only when the one who pushes has left its place.
@@ -118,8 +130,7 @@ class Tracks:
                 body["confirmed"], body["from_furniture"], body["robot"] = 0, 1, 0
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             else:
-                events.append(Moved(t, int(body["label"]), _xy(body), _cov(body)))
-                _told(body, t)
+                events.append(Moved(t, *self._tell(index, t)))
         return events
 
     def labels(self, t: float) -> list[FloorLabel]:
@@ -129,7 +140,7 @@ class Tracks:
                 int(body["label"]),
                 "mover",
                 _xy(body),
-                _cov(body),
+                _cov(float(body["pp"])),
                 float(body["first"]),
                 float(body["seen"]),
                 None if body["stale"] else (float(body["vx"]), float(body["vy"])),
@@ -169,28 +180,20 @@ class Tracks:
 
     def _see_off(self, t: float) -> None:
         """Who has gone on out of the room while nobody saw him has left."""
-        bodies = self.bodies
-        unseen = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == 0)
-        for index in np.flatnonzero(unseen & (bodies["seen"] < t - _THROUGH_S)).tolist():
-            body = bodies[index]
+        for index in self._rows[: unseen(self.bodies, t - _THROUGH_S, self._rows)].tolist():
+            body = self.bodies[index]
             if self._through(body) and body["seen"] - body["rest_at"] < _RESTS_S:
                 self._actions[index] = GONE
 
     def _unite(self, t: float) -> list[FloorEvent]:
         """Two movers with one foot each at one place are one: the younger label goes."""
-        bodies = self.bodies
-        lone = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["single"] > 0.5))
         events: list[FloorEvent] = []
-        for index in lone.tolist():
-            for other in lone.tolist():
-                one, two = bodies[other], bodies[index]
-                near = math.hypot(one["x"] - two["x"], one["y"] - two["y"]) < _UNITE_M
-                near = near and two["both"] < _BOTH * two["hits"]
-                if near and one["used"] and two["used"] and one["label"] < two["label"]:
-                    self._association.decide()
-                    self._association.forget(index)
-                    if not self.absent.keep(two):
-                        events.append(Vanished(t, int(two["label"]), float(two["seen"]), t))
+        while (index := doubled(self.bodies)) >= 0:
+            body = self.bodies[index]
+            self._association.decide()
+            self._association.forget(index)
+            if not self.absent.keep(body):
+                events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
         return events
 
     def _lost(self, index: int, t: float) -> list[FloorEvent]:
@@ -271,14 +274,17 @@ class Tracks:
             body["confirmed"], body["label"], body["first"] = 1, label, first
             self._association.named(index, _xy(old))
             body["robot"] = old["robot"]
-            _told(body, t)
-            return [Back(t, label, _xy(body))] if stale else [Moved(t, label, _xy(body), _cov(body))]
+            label, xy, cov = self._tell(index, t)
+            return [Back(t, label, xy)] if stale else [Moved(t, label, xy, cov)]
         body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
         self._association.named(index)
-        _told(body, t)
-        width = float(body["width"])
-        since = float(body["first"])
-        return [Appeared(t, int(body["label"]), "mover", _xy(body), _cov(body), robot, since, (), width)]
+        label, xy, cov = self._tell(index, t)
+        return [Appeared(t, label, "mover", xy, cov, robot, float(body["first"]), (), float(body["width"]))]
+
+    def _tell(self, index: int, t: float) -> tuple[int, tuple[float, float], Covariance]:
+        """(label, place, covariance) of the mover, which is told now."""
+        label, x, y, variance = tell(self.bodies, index, t)
+        return label, (x, y), _cov(variance)
 
     def _is_robot(self, body: Any) -> bool:
         if self._robots:
@@ -316,14 +322,10 @@ class Tracks:
         return best
 
 
-def _told(body: Any, t: float) -> None:
-    body["told_x"], body["told_y"], body["told_at"] = body["x"], body["y"], t
-
-
 def _xy(body: Any) -> tuple[float, float]:
     return float(body["x"]), float(body["y"])
 
 
-def _cov(body: Any) -> tuple[float, float, float]:
+def _cov(variance: float) -> Covariance:
     # Two feet tell of the middle of a body by about 5 cm, however long they stand.
-    return (variance := float(body["pp"]) + 0.0025), 0.0, variance
+    return variance + 0.0025, 0.0, variance + 0.0025

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from tms_agents.floor.assignment import assign
+from tms_agents.floor.assignment import assign, reassign, solve
 
 
 @settings(max_examples=100)
@@ -23,3 +23,40 @@ def test_the_sum_is_the_least(rows: int, extra: int, seed: int, coarse: bool) ->
     assert len(set(columns.tolist())) == rows
     assert np.isclose(cost[np.arange(rows), columns].sum(), total)
     assert np.isclose(total, best)
+
+
+@settings(max_examples=200)
+@given(
+    rows=st.integers(1, 9),
+    people=st.integers(1, 9),
+    seed=st.integers(0, 10**6),
+    share=st.floats(0.1, 1.0),
+    most=st.sampled_from([2.0, 7.0, 1e9]),
+)
+def test_the_next_best_is_that_of_a_table_without_what_is_barred(
+    rows: int, people: int, seed: int, share: float, most: float
+) -> None:
+    """As in a scan: two columns for each person, of whom a row knows some, and one of its own for each row."""
+    rng = np.random.default_rng(seed)
+    cost = np.full((rows, 2 * people + rows), 1e6)
+    cost[:, : 2 * people] = np.where(
+        rng.uniform(size=(rows, 2 * people)) < share, rng.uniform(-3.0, 20.0, (rows, 2 * people)), 1e6
+    )
+    cost[np.arange(rows), 2 * people + np.arange(rows)] = rng.uniform(2.0, 12.0, rows)
+    columns, of_column = np.empty(rows, np.int64), np.empty(cost.shape[1], np.int64)
+    u, v = np.empty(rows), np.empty(cost.shape[1])
+    best = solve(cost, columns, of_column, u, v)
+    for row in np.flatnonzero(columns < 2 * people).tolist():
+        barred = int(columns[row]) // 2 * 2
+        without = cost.copy()
+        without[row, barred : barred + 2] = 1e6
+        expected = without[linear_sum_assignment(without)].sum()
+        other = np.full(rows, -1)
+        total = reassign(cost, columns, of_column, u, v, row, barred, most, other)
+        if expected - best < 0.99 * most:
+            assert np.isclose(total, expected)
+            assert len(set(other.tolist())) == rows
+            assert other[row] not in (barred, barred + 1)
+            assert np.isclose(cost[np.arange(rows), other].sum(), total)
+        elif expected - best > 1.01 * most:
+            assert total == np.inf

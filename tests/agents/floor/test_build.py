@@ -139,6 +139,7 @@ def test_who_has_just_put_down_a_shoe_goes_where_it_points(backwards: bool) -> N
 )
 def test_all_show_what_is_known_to_be_seen(share: float, seen: int, kind: str) -> None:
     bodies = empty(BODY, (2, 2))
+    bodies["used"] = 1
     bodies["shoe"] = [[0.05, 0.8], [0.5, 0.0]]
     agree(bodies, np.array([share, seen]))
     shod = (bodies["shoe"] >= SHOES).tolist()
