@@ -156,7 +156,6 @@ class Told(Association):
         free = np.ones(count, np.bool_)
         adopt(self.bodies, rows, columns, clusters, of, marks, free, BLANK, prints, t, sight)
         complete(self.bodies, rows, clusters, of, marks, free, BLANK, prints, t, sight)
-        self.decide()
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return ~free
 

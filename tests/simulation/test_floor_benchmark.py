@@ -119,3 +119,32 @@ def test_the_fit_makes_owners_likelier_than_the_numbers_it_begins_with(
     kept = {line.split(":")[0]: float(line.split("kept aside ")[1].split(" ")[0]) for line in told.splitlines()[1:3]}
     assert told.startswith("fitting 36 numbers to 90 choices; 30 kept aside")
     assert kept["fitted"] < 0.7 * kept["as it is"]
+
+
+def test_the_fit_of_places_finds_the_numbers_it_was_made_with(benchmark: Any) -> None:
+    from floor_places import Samples, added, fit
+
+    from tms_agents.floor.place import TERMS
+
+    rng = np.random.default_rng(4)
+    n = 4000
+    samples = Samples(
+        rng.integers(0, len(TERMS), n),
+        rng.uniform(0.0, 1.5, n),
+        rng.normal(0.0, 0.5, (n, TERMS.shape[1], 2)),
+        np.zeros((n, 2)),
+        np.zeros((n, 2)),
+        rng.uniform(size=n) < 0.3,
+    )
+    terms = TERMS + rng.normal(0.0, 0.3, TERMS.shape)
+    away = -added(samples, terms) + rng.normal(0.0, 0.05, (n, 2))
+    assert np.abs(fit(replace(samples, filtered=away)) - terms).max() < 0.03
+
+
+def test_people_in_shoes_are_watched_as_they_walk(benchmark: Any) -> None:
+    from floor_places import watched
+
+    rows = watched(("one", 1502, "fine"))
+    filtered, told = (np.array([row[k] for row in rows]) for k in (3, 4))
+    assert len(rows) > 100
+    assert np.mean(told**2) < np.mean(filtered**2)

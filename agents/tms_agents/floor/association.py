@@ -12,6 +12,7 @@ from tms_agents.floor.adopting import BLANK, adopt_from, chosen, complete
 from tms_agents.floor.assignment import reassign, solve
 from tms_agents.floor.bodies import predict
 from tms_agents.floor.build import agree
+from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import feet, known, nobodys
 from tms_agents.floor.shine import expected, scatter
@@ -20,79 +21,12 @@ from tms_agents.floor.state import BODY, empty, pack, unpack
 Array = NDArray[np.float64]
 
 #: Hypotheses kept; how much worse (negative log likelihood) one may be than the best, and its parent's.
-_KEPT, _WORSE, _BRANCH = 12, 14.0, 7.0
+_KEPT, _WORSE, _BRANCH = 14, 18.0, 10.0
 #: Of a scan so many bodies that took the same feet are kept, to be copied.
 _POOL = 256
-#: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
-_NEAR_M, _ALIKE = 0.08, 0.3
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
 OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
 NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
-#: What has nothing to do with whose foot a cluster is.
-_BESIDES = (
-    *("told_x", "told_y", "told_at", "clear", "lone", "lone_x", "lone_y", "rest_x", "rest_y", "rest_at", "pushed"),
-    *("quality", "single", "still", "look", "look_n", "pace", "pace_n", "girth", "girth_n", "sole", "sole_n", "sure"),
-)
-_ALL = np.arange(len(BODY.names or ()))
-_FEET = np.array([index for index, field in enumerate(BODY.names or ()) if field not in _BESIDES])
-
-
-@njit(cache=True)
-def _same(one: Any, two: Any, of: NDArray[np.int64]) -> bool:
-    """Whether two hypotheses put the movers at the same places on the same prints, whoever is who; ``of`` (n,) tells.
-
-    Then the way people go on cannot tell them apart: only how they look and walk can (`identity`).
-    """
-    for b in range(one.size):
-        p = one[b]
-        of[b] = -1
-        if not (p.used and p.confirmed):
-            continue
-        found = False
-        for o in range(two.size):
-            # Most often it is the same one.
-            q = two[(b + o) % two.size]
-            of[b] = (b + o) % two.size
-            if not (q.used and q.confirmed):
-                continue
-            near = _NEAR_M if p.a_print < 0 and p.b_print < 0 else 4.0 * _NEAR_M
-            if abs(p.x - q.x) > near or abs(p.y - q.y) > near:
-                continue
-            if abs(p.vx - q.vx) > _ALIKE or abs(p.vy - q.vy) > _ALIKE:
-                continue
-            straight = p.a_print == q.a_print and p.b_print == q.b_print
-            if straight or (p.a_print == q.b_print and p.b_print == q.a_print):
-                found = True
-                break
-        if not found:
-            return False
-    return True
-
-
-@njit(cache=True)
-def _first_like(raw: NDArray[np.int64], fields: NDArray[np.int64], h: int, row: int) -> int:
-    """The first hypothesis in which the body ``row`` is exactly as in hypothesis h, in these fields of ``raw``."""
-    for g in range(h):
-        same = True
-        for field in fields:
-            if raw[g, row, field] != raw[h, row, field]:
-                same = False
-                break
-        if same:
-            return g
-    return h
-
-
-@njit(cache=True)
-def _copy(source: Any, source_belief: Array, target: Any, target_belief: Array, believed: bool) -> None:
-    """Copy the bodies that are used, and who they may be; those that are ``believed`` only if that is wanted."""
-    for b in range(source.size):
-        if source[b].used:
-            if believed or not source[b].confirmed:
-                target[b] = source[b]
-            target_belief[b] = source_belief[b]
-        else:
-            target[b].used = 0
 
 
 @njit(cache=True)
@@ -128,8 +62,8 @@ def _advance(
         predict(hypotheses[h], t)
         for b in range(n):
             if hypotheses[h, b].used:
-                first[h, b] = _first_like(raw, _ALL, h, b)
-                alike[h, b] = _first_like(raw, _FEET, h, b)
+                first[h, b] = first_like(raw, ALL, h, b)
+                alike[h, b] = first_like(raw, FEET, h, b)
     children = _propose(
         hypotheses, alike, scores, clusters, of, marks, prints, t, child_score, child_parent, child_columns
     )
@@ -143,7 +77,7 @@ def _advance(
         if kept == hypotheses.shape[0] or child_score[o] > least + _WORSE:
             break
         bodies, parent = spare[kept], child_parent[o]
-        _copy(hypotheses[parent], beliefs[parent], bodies, spare_beliefs[kept], False)
+        copy(hypotheses[parent], beliefs[parent], bodies, spare_beliefs[kept], False)
         k = chosen(hypotheses[parent], 1, rows)
         free[:] = True
         pooled = adopt_from(
@@ -168,7 +102,7 @@ def _advance(
         score = child_score[o] - least + complete(bodies, rows[:k], clusters, of, marks, free, blank, prints, t, sight)
         known_already = False
         for j in range(kept):
-            if _same(spare[j], bodies, other_of):
+            if same_places(spare[j], bodies, other_of):
                 worse = score - scores[j]
                 unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, worse, scattered, scratch)
                 known_already = True
@@ -182,7 +116,7 @@ def _advance(
     best = int(np.argmin(scores[:kept]))
     for h in range(kept):
         source = best if h == 0 else (0 if h == best else h)
-        _copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h], True)
+        copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h], True)
     scores[0], scores[best] = scores[best], scores[0]
     scores[:kept] -= scores[0]
     for i in range(m):
@@ -258,6 +192,7 @@ class Association:
         self._pool = empty(BODY, _POOL)
         # All fields are as long as an integer: what is the same to the last bit is found by these.
         self._raw = self._hypotheses.view(np.int64).reshape(_KEPT, most, -1)
+        self._before, self._decided = np.zeros_like(self._raw[0]), np.zeros(most, np.bool_)
         self._beliefs, self._spare_beliefs = np.zeros((_KEPT, most, most)), np.zeros((_KEPT, most, most))
         self._beliefs[:] = np.eye(most)
         self._names = np.zeros(most, np.int64)
@@ -297,15 +232,31 @@ class Association:
         """All show one kind of feet, once it is known which; ``shoes`` (2,) is what `build.count_shoes` learns."""
         agree(self._hypotheses[: self._count], shoes)
 
-    def decide(self) -> None:
-        """From now on only the best hypothesis counts."""
-        self._count = 1
-        self._scores[0] = 0.0
+    def mark(self) -> None:
+        """From now on until `settle` what is known of the best hypothesis may change."""
+        self._before[:] = self._raw[0]
+        self._decided[:] = False
+
+    def decide(self, *indices: int) -> None:
+        """What is found of these movers is so: hypotheses in which they are others count no more."""
+        self._decided[list(indices)] = True
+
+    def decide_changed(self) -> None:
+        """The same of everybody who is another one since `mark`."""
+        self._decided |= (self._before != self._raw[0])[:, FEET].any(axis=1)
+
+    def settle(self) -> None:
+        """What has changed since `mark` is so in all hypotheses in which it was as in the best."""
+        if self._count > 1:
+            self._count = settle(
+                self._hypotheses, self._raw, self._before, self._decided, self._scores, self._beliefs, self._count
+            )
 
     def named(self, index: int, lost: tuple[float, float] | None = None) -> None:
         """The mover at ``index`` has a name of its own, or that of one who was ``lost`` at (x, y) m."""
-        self.decide()
-        christen(self.bodies, self._beliefs[0], index, *((np.nan, np.nan) if lost is None else lost))
+        self.decide(index)
+        for bodies, belief in zip(self._hypotheses[: self._count], self._beliefs[: self._count], strict=True):
+            christen(bodies, belief, index, *((np.nan, np.nan) if lost is None else lost))
 
     def rename(self, t: float) -> None:
         """Give people their own names back."""

@@ -143,13 +143,14 @@ class FloorEstimator:
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
         count_shoes(bodies, clusters[:feet], of[:feet], t, self._shoes)
         self._association.agree(self._shoes)
+        self._association.mark()
         if recognize(bodies, *self._robots):
-            self._association.decide()
+            self._association.decide_changed()
         attend(prints, bodies, t, dt, self._association.scattered, self._shoes)
         scattered = self._association.scattered
         mended = exchange(bodies, prints, t, scattered) + release(bodies, prints, t)
         if mended + take_back(bodies, prints, t, scattered):
-            self._association.decide()
+            self._association.decide_changed()
         count_feet(prints, bodies, t, dt)
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
             for other in self._views.values():
@@ -164,6 +165,7 @@ class FloorEstimator:
             lambda body: self._furniture.was(body, self._pieces(t)),
             learned=view.background.learned,
         )
+        self._association.settle()
         appeared: list[FloorEvent] = []
         if view.background.learned:
             for index, kind in objects.ripe(prints, bodies, t, scattered):

@@ -331,11 +331,3 @@ def doubled(bodies: Any) -> int:
             if lone and np.hypot(other.x - body.x, other.y - body.y) < _UNITE_M:
                 return b
     return -1
-
-
-@njit(cache=True)
-def tell(bodies: Any, index: int, t: float) -> tuple[int, float, float, float]:
-    """(label, x m, y m, variance m²) of the mover, and remember that it is told at t."""
-    body = bodies[index]
-    body.told_x, body.told_y, body.told_at = body.x, body.y, t
-    return body.label, body.x, body.y, body.pp

@@ -13,6 +13,7 @@ from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.masks import Area
+from tms_agents.floor.place import place, tell
 from tms_agents.floor.review import (
     BACK,
     CONFIRM,
@@ -23,7 +24,6 @@ from tms_agents.floor.review import (
     has_walked,
     is_footless,
     review,
-    tell,
     unseen,
 )
 from tms_agents.floor.settings import FloorSettings, Scene
@@ -126,7 +126,7 @@ class Tracks:
                 and (body["pushed"] > 0.8 or was_furniture(body))
             ):
                 # Furniture that is pushed is seen to be missing only when the one who pushes has left its place.
-                self._association.decide()
+                self._association.decide(index)
                 body["confirmed"], body["from_furniture"], body["robot"] = 0, 1, 0
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             else:
@@ -135,21 +135,7 @@ class Tracks:
 
     def labels(self, t: float) -> list[FloorLabel]:
         """The movers there are."""
-        return [
-            FloorLabel(
-                int(body["label"]),
-                "mover",
-                _xy(body),
-                _cov(float(body["pp"])),
-                float(body["first"]),
-                float(body["seen"]),
-                None if body["stale"] else (float(body["vx"]), float(body["vy"])),
-                bool(body["robot"]),
-                bool(body["stale"]),
-            )
-            for body in self.bodies
-            if body["used"] and body["confirmed"]
-        ]
+        return [_label(body, t) for body in self.bodies if body["used"] and body["confirmed"]]
 
     def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
         """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
@@ -190,7 +176,6 @@ class Tracks:
         events: list[FloorEvent] = []
         while (index := doubled(self.bodies)) >= 0:
             body = self.bodies[index]
-            self._association.decide()
             self._association.forget(index)
             if not self.absent.keep(body):
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
@@ -211,7 +196,7 @@ class Tracks:
             return [Vanished(t, int(body["label"]), float(body["seen"]), t) if left else Stale(t, int(body["label"]))]
         if body["seen"] == t:
             # What is seen is something else.
-            self._association.decide()
+            self._association.decide(index)
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
             body["lone"] = body["wide"] = 0.0
@@ -258,13 +243,17 @@ class Tracks:
         elif (body["wide"] > 0.3 or is_footless(body)) and (body["pushed"] > 0.6 or was_furniture(body)):
             body["from_furniture"] = 1
             return []
-        self._association.decide()
+        self._association.decide(index)
         robot = self._is_robot(body)
         if robot and body["from_furniture"] == 0 and body["pushed"] < _ALONE:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
-        old = self._missing(body)
-        if old is None and not is_footless(body):
+        missing = self._missing(body)
+        old = None
+        if missing is not None:
+            self._association.decide(missing)
+            old = self.bodies[missing]
+        elif not is_footless(body):
             old = self.absent.find(body, self._association.scattered)
         if old is not None:
             stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
@@ -284,7 +273,7 @@ class Tracks:
     def _tell(self, index: int, t: float) -> tuple[int, tuple[float, float], Covariance]:
         """(label, place, covariance) of the mover, which is told now."""
         label, x, y, variance = tell(self.bodies, index, t)
-        return label, (x, y), _cov(variance)
+        return label, (x, y), (variance, 0.0, variance)
 
     def _is_robot(self, body: Any) -> bool:
         if self._robots:
@@ -293,11 +282,11 @@ class Tracks:
             return bool(0.7 * least < body["far"] < 1.2 * most and body["wide"] > 0.3)
         return bool(body["wide"] > 0.5)
 
-    def _missing(self, body: Any) -> Any:
-        """The mover not seen now that this one most probably is: hidden, seated, or only thought to be seen."""
+    def _missing(self, body: Any) -> int | None:
+        """Which mover not seen now this one most probably is: hidden, seated, or only thought to be seen."""
         best, best_gap = None, 1.0
         broad = body["wide"] > 0.3 or is_footless(body)
-        for other in self.bodies:
+        for index, other in enumerate(self.bodies):
             if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
                 continue
             if broad and not other["robot"] and has_walked(other):
@@ -318,7 +307,7 @@ class Tracks:
                 if out_of_view(other) and not steps:
                     gap, reach = min(gap, area.distance(body["x0"], body["y0"]) + 0.05), 0.7
             if gap / reach < best_gap:
-                best, best_gap = other, gap / reach
+                best, best_gap = index, gap / reach
         return best
 
 
@@ -326,6 +315,16 @@ def _xy(body: Any) -> tuple[float, float]:
     return float(body["x"]), float(body["y"])
 
 
-def _cov(variance: float) -> Covariance:
-    # Two feet tell of the middle of a body by about 5 cm, however long they stand.
-    return variance + 0.0025, 0.0, variance + 0.0025
+def _label(body: Any, t: float) -> FloorLabel:
+    x, y, variance = place(body, t)
+    return FloorLabel(
+        int(body["label"]),
+        "mover",
+        (x, y),
+        (variance, 0.0, variance),
+        float(body["first"]),
+        float(body["seen"]),
+        None if body["stale"] else (float(body["vx"]), float(body["vy"])),
+        bool(body["robot"]),
+        bool(body["stale"]),
+    )

@@ -9,6 +9,7 @@ import pytest
 
 from tms_agents.floor import FloorEstimator, Sensor, association, likelihood
 from tms_agents.floor.association import Association
+from tms_agents.floor.hypotheses import BESIDES
 from tms_agents.simulation.floor_world import FloorWorld
 
 
@@ -37,7 +38,7 @@ def test_whose_foot_it_is_has_nothing_to_do_with_the_rest(feet: Any, monkeypatch
     def step(self: Association, clusters: Any, of: Any, marks: Any, prints: Any, t: float, sight: Any) -> Any:
         bodies = self.bodies.copy()
         other = bodies.copy()
-        for field in association._BESIDES:
+        for field in BESIDES:
             other[field] = rng.integers(0, 100, other.size)
         free = np.ones(clusters.size, np.bool_)
         for row in np.flatnonzero(bodies["used"]).tolist():

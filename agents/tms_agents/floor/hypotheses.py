@@ -1,0 +1,125 @@
+"""Hypotheses about who is where, side by side: what they have in common, and what is found of the best is so in all."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.state import BODY
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
+_NEAR_M, _ALIKE = 0.08, 0.3
+#: What was seen of somebody since it was last in doubt who he is: another doubt, another time.
+_LATELY = ("look", "look_n", "pace", "pace_n", "girth", "girth_n", "sole", "sole_n", "sure")
+#: What has nothing to do with whose foot a cluster is.
+BESIDES = (
+    *("told_x", "told_y", "told_at", "clear", "lone", "lone_x", "lone_y", "rest_x", "rest_y", "rest_at", "pushed"),
+    *("quality", "single", "still", "older", "odd", *_LATELY),
+)
+_NAMES = BODY.names or ()
+#: Indices in records of integers: of all fields, of those that have to do with it, and of what is found of the best.
+ALL = np.arange(len(_NAMES))
+FEET = np.array([index for index, field in enumerate(_NAMES) if field not in BESIDES])
+FOUND = np.array([index for index, field in enumerate(_NAMES) if field not in _LATELY])
+
+
+@njit(cache=True)
+def same_places(one: Any, two: Any, of: Integers) -> bool:
+    """Whether two hypotheses put the movers at the same places on the same prints, whoever is who; ``of`` (n,) tells.
+
+    Then the way people go on cannot tell them apart: only how they look and walk can (`identity`).
+    """
+    for b in range(one.size):
+        p = one[b]
+        of[b] = -1
+        if not (p.used and p.confirmed):
+            continue
+        found = False
+        for o in range(two.size):
+            # Most often it is the same one.
+            q = two[(b + o) % two.size]
+            of[b] = (b + o) % two.size
+            if not (q.used and q.confirmed):
+                continue
+            near = _NEAR_M if p.a_print < 0 and p.b_print < 0 else 4.0 * _NEAR_M
+            if abs(p.x - q.x) > near or abs(p.y - q.y) > near:
+                continue
+            if abs(p.vx - q.vx) > _ALIKE or abs(p.vy - q.vy) > _ALIKE:
+                continue
+            straight = p.a_print == q.a_print and p.b_print == q.b_print
+            if straight or (p.a_print == q.b_print and p.b_print == q.a_print):
+                found = True
+                break
+        if not found:
+            return False
+    return True
+
+
+@njit(cache=True)
+def first_like(raw: Integers, fields: Integers, h: int, row: int) -> int:
+    """The first hypothesis in which the body ``row`` is exactly as in hypothesis h, in these fields of ``raw``."""
+    g = 0
+    while g < h and not _equal(raw[g, row], raw[h, row], fields):
+        g += 1
+    return g
+
+
+@njit(cache=True)
+def _equal(one: Integers, two: Integers, fields: Integers) -> bool:
+    """Whether two bodies, as integers, are the same in these fields."""
+    k = 0
+    while k < fields.size and one[fields[k]] == two[fields[k]]:
+        k += 1
+    return k == fields.size
+
+
+@njit(cache=True)
+def copy(source: Any, source_belief: Array, target: Any, target_belief: Array, believed: bool) -> None:
+    """Copy the bodies that are used, and who they may be; those that are ``believed`` only if that is wanted."""
+    for b in range(source.size):
+        if source[b].used:
+            if believed or not source[b].confirmed:
+                target[b] = source[b]
+            target_belief[b] = source_belief[b]
+        else:
+            target[b].used = 0
+
+
+@njit(cache=True)
+def settle(
+    hypotheses: Any,
+    raw: Integers,
+    before: Integers,
+    decided: NDArray[np.bool_],
+    scores: Array,
+    beliefs: Array,
+    count: int,
+) -> int:
+    """What became of bodies of the best hypothesis holds in all in which they were the same: how many there are.
+
+    Hypotheses (kept, n), as integers ``raw`` (kept, n, fields); bodies of the best as they were ``before`` (n, fields).
+    Hypotheses in which one is another that is ``decided`` (n,) are dropped; ``scores`` and ``beliefs`` move along.
+    """
+    n = hypotheses.shape[1]
+    kept = 1
+    for h in range(1, count):
+        good = True
+        for b in range(n):
+            good &= not decided[b] or _equal(raw[h, b], before[b], FEET)
+        if not good:
+            continue
+        if kept < h:
+            copy(hypotheses[h], beliefs[h], hypotheses[kept], beliefs[kept], True)
+            scores[kept] = scores[h]
+        for b in range(n):
+            if hypotheses[kept, b].used and _equal(raw[kept, b], before[b], FEET):
+                for field in FOUND:
+                    raw[kept, b, field] = raw[0, b, field]
+        kept += 1
+    return kept
