@@ -184,7 +184,7 @@ class FloorEstimator:
             return []
         waits_s = _WAITS_S if q["busy"] < q["rested"] else _STOPS_S
         waits = kind == OBJECT and not q["given"] and t - q["first"] < waits_s and self._gates.distance(x, y) == 0.0
-        if waits and not has_left(q, self._tracks.bodies, t):
+        if waits and not has_left(q, self._tracks.bodies):
             return []
         started = min(view.background.seconds for view in self._views.values())
         known = t - q["first"] > started - self._settings.learn_s

@@ -23,7 +23,7 @@ _MUTES = 6
 _HIS_S, _STILL_S = 20.0, 30.0
 #: What is so much of the time a part of something else is watched for so long (s).
 _JOINED, _JOINED_S = 0.3, 25.0
-#: Whose foot it was has gone if both his feet are seen (until now, s) so far away (m).
+#: Whose foot it was has gone if both his feet were seen (within s) so far away (m).
 _SEEN_S, _FAR_M = 0.5, 0.9
 
 
@@ -39,7 +39,7 @@ def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> f
         return _WATCHED_S if hardly or foot else 0.0
     if q.attached > _JOINED:
         return _JOINED_S
-    gone = has_left(q, bodies, t)
+    gone = has_left(q, bodies)
     if q.owned - q.first > _HIS_S and t - q.owned < _STILL_S and not gone:
         return np.inf
     return _WATCHED_S if t - q.busy < _NOW_S or (hardly and not gone) else 0.0
@@ -59,11 +59,11 @@ def _may_be_foot(q: Any, bodies: Any, scattered: NDArray[np.float64]) -> bool:
 
 
 @njit(cache=True)
-def has_left(q: Any, bodies: Any, t: float) -> bool:
-    """Whether whose foot the print was taken for stands or walks elsewhere."""
+def has_left(q: Any, bodies: Any) -> bool:
+    """Whether whose foot the print was taken for stands or walks elsewhere, or did when he was seen last."""
     for b in range(bodies.size):
         body = bodies[b]
-        his = body.used and body.confirmed and not body.stale and body.label == q.whose
-        if his and t - min(body.a_seen, body.b_seen) < _SEEN_S:
+        his = body.used and body.confirmed and body.label == q.whose
+        if his and body.seen - min(body.a_seen, body.b_seen) < _SEEN_S:
             return bool(np.hypot(body.x - q.x, body.y - q.y) > _FAR_M)
     return False

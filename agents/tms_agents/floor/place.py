@@ -44,8 +44,9 @@ VARIANCES = np.array(
 )
 #: Who shows legs: two feet tell of the middle of a body by about 5 cm, however long they stand.
 _LEGS_VAR = 0.05**2
-#: No step and no stride is so long (m), and no foot so far away (m); what was seen so lately (s) is seen now.
-_STEP_M, _STRIDE_M, _AWAY_M, _NOW_S = 1.2, 1.8, 1.0, 0.02
+#: No step and no stride is so long (m), and no foot so far away (m); what was seen so lately (s) is seen now: several
+#: lasers scan in turns.
+_STEP_M, _STRIDE_M, _AWAY_M, _NOW_S = 1.2, 1.8, 1.0, 0.08
 
 
 @njit(cache=True)

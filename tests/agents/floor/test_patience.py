@@ -16,8 +16,11 @@ from tms_agents.floor.state import BODY, PRINT, THING, empty
 NOW = 100.0
 
 
-def wanted(beside: float | None = None, **fields: float) -> float:
-    """For how long a print in full view is watched, its owner (label 1) or somebody with both feet so far (m) off."""
+def wanted(beside: float | None = None, unseen_s: float = 0.0, hidden_foot_s: float = 0.0, **fields: float) -> float:
+    """For how long a print in full view is watched, its owner (label 1) or somebody with both feet so far (m) off.
+
+    He was seen so long (s) ago, and one of his feet so long before that.
+    """
     prints, bodies = empty(PRINT, 1), empty(BODY, 1)
     values = {"used": 1, "first": NOW - 5.0, "rested": NOW - 5.0, "last": NOW, "width": 0.08, "hits": 50, "whole": 50}
     values |= {"whose": -1, "owned": -1e9, "busy": -1e9}
@@ -28,7 +31,9 @@ def wanted(beside: float | None = None, **fields: float) -> float:
             bodies[name] = 1
         for name in ("x", "ax", "bx"):
             bodies[name] = beside
-        bodies["a_seen"] = bodies["b_seen"] = NOW
+        bodies["seen"] = bodies["a_seen"] = NOW - unseen_s
+        bodies["b_seen"] = NOW - unseen_s - hidden_foot_s
+        bodies["stale"] = unseen_s > 1.0
         bodies["own"], bodies["own_n"] = 7.0, 500
     return float(patience(prints[0], bodies, NOW, expected()))
 
@@ -48,6 +53,13 @@ def test_whose_foot_it_was_has_gone_if_both_his_feet_are_seen_elsewhere() -> Non
     assert wanted(2.0, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) == 0.0
     assert wanted(0.5, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) > 10.0
     assert wanted(2.0, whole=0, whose=7, owned=NOW - 2.0, busy=NOW - 2.0) > 10.0
+
+
+def test_whose_foot_it_was_has_gone_also_if_he_is_hidden_there() -> None:
+    gone = {"whole": 0, "whose": 1, "owned": NOW - 4.0, "busy": NOW - 4.0}
+    assert wanted(2.0, unseen_s=0.7, **gone) == wanted(2.0, unseen_s=3.0, **gone) == 0.0
+    assert wanted(0.5, unseen_s=3.0, **gone) > 10.0
+    assert wanted(2.0, unseen_s=3.0, hidden_foot_s=0.6, **gone) > 10.0  # this may be the other one
 
 
 def test_where_somebody_stood_for_long_he_is_waited_for_until_he_is_seen_elsewhere() -> None:
