@@ -60,7 +60,7 @@ def _may_be_foot(q: Any, bodies: Any, scattered: NDArray[np.float64]) -> bool:
 
 @njit(cache=True)
 def has_left(q: Any, bodies: Any) -> bool:
-    """Whether whose foot the print was taken for stands or walks elsewhere, or did when he was seen last."""
+    """Whether whose foot the print was taken for stands or walks elsewhere, or would as he went when last seen."""
     for b in range(bodies.size):
         body = bodies[b]
         his = body.used and body.confirmed and body.label == q.whose
