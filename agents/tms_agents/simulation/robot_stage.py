@@ -139,7 +139,8 @@ class RobotStage:
             while not self._unplug.is_set():
                 self._look()
                 with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._unplug.wait(), _LOOK_S)
+                    async with asyncio.timeout(_LOOK_S):
+                        await self._unplug.wait()
 
     def start_devices(self) -> Callable[[], None]:
         """Plug in; the answer pulls all plugs."""

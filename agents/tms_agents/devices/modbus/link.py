@@ -95,7 +95,9 @@ class ModbusLink(DeviceLink[LoadSample]):
         clock = asyncio.get_running_loop().time
         alive = clock()
         try:
-            if not await client.connect():
+            connected = await client.connect()
+            _stop_if_cancelled()
+            if not connected:
                 raise DeviceFault("cannot be reached")
             while True:
                 registers = await self._ask(client)
@@ -126,6 +128,8 @@ class ModbusLink(DeviceLink[LoadSample]):
                 answer = await read(address, count=count, device_id=self._map.device_id)
             except ModbusException:
                 return None
+            finally:
+                _stop_if_cancelled()
             if answer.isError():
                 code = getattr(answer, "exception_code", 0)
                 if code in _BUSY:
@@ -136,6 +140,13 @@ class ModbusLink(DeviceLink[LoadSample]):
                 raise DeviceFault(f"{len(answer.registers)} registers at {address} instead of {count}")
             registers |= {address + i: value for i, value in enumerate(answer.registers)}
         return registers
+
+
+def _stop_if_cancelled() -> None:
+    """``asyncio.wait_for`` of Python 3.11, in pymodbus, forgets a cancellation in whose moment the answer comes."""
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
 
 
 def _need_pymodbus() -> None:

@@ -145,6 +145,27 @@ async def test_silence_a_pulled_cable_and_back_without_restart(kind):
         assert all(sample.values == pytest.approx(GRAMS) for sample in samples(seen))
 
 
+async def test_it_ends_at_whatever_moment_it_is_stopped():
+    """Stopped in the very step of the event loop in which an answer arrives, too."""
+    async with line("tcp", WeighingModule(CELLS, lambda t: GRAMS)) as (_, opener):
+        for steps in range(60):
+            heard = asyncio.Event()
+
+            async def listen(heard=heard):
+                async with contextlib.aclosing(module_link(opener, period_s=1e-4).listen()) as items:
+                    async for item in items:
+                        if not isinstance(item, DeviceState):
+                            heard.set()
+
+            task = asyncio.create_task(listen())
+            await heard.wait()
+            for _ in range(steps):
+                await asyncio.sleep(0)
+            task.cancel()
+            ended, _ = await asyncio.wait([task], timeout=2.0)
+            assert ended, f"it goes on, stopped {steps} steps after an answer"
+
+
 async def test_nobody_there(tmp_path):
     (state,) = await until(module_link(modbus_tcp("127.0.0.1", 9)), lambda seen: True)
     assert state == DeviceState("faulty", "module: cannot be reached")
