@@ -23,7 +23,7 @@ _MUTES = 6
 _HIS_S, _STILL_S = 20.0, 30.0
 #: What is so much of the time a part of something else is watched for so long (s).
 _JOINED, _JOINED_S = 0.3, 25.0
-#: Whose foot it was has gone if both his feet were seen (within s) so far away (m).
+#: Whose foot it was has gone if both his feet were seen (within s) so far away (m); nobody is near who is not nearer.
 _SEEN_S, _FAR_M = 0.5, 0.9
 
 
@@ -36,7 +36,7 @@ def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> f
     hardly = q.hits > HARDLY * q.whole and q.mutes < _MUTES
     if q.given:
         foot = q.width > _SIDE_M or t - q.owned < _NOW_S or _may_be_foot(q, bodies, scattered)
-        return _WATCHED_S if hardly or foot else 0.0
+        return _WATCHED_S if foot or (hardly and _somebody_near(q, bodies)) else 0.0
     if q.attached > _JOINED:
         return _JOINED_S
     gone = has_left(q, bodies)
@@ -56,6 +56,16 @@ def _may_be_foot(q: Any, bodies: Any, scattered: NDArray[np.float64]) -> bool:
         if away < _UNDER_M or (away < _BESIDE_M and strangeness(body, q, scattered) < _LIKE):
             return True
     return False
+
+
+@njit(cache=True)
+def _somebody_near(q: Any, bodies: Any) -> bool:
+    """Whether somebody, believed or not, seen or not, is so near that the print may be his leg behind the other one."""
+    near = False
+    for b in range(bodies.size):
+        body = bodies[b]
+        near = near or (body.used and not body.robot and np.hypot(body.x - q.x, body.y - q.y) < _FAR_M)
+    return near
 
 
 @njit(cache=True)

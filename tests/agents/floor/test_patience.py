@@ -46,7 +46,12 @@ def test_what_nobody_stood_on_and_all_of_which_is_seen_is_told_at_once() -> None
 def test_what_was_never_seen_whole_may_be_a_leg_behind_another() -> None:
     assert wanted(whole=0) > 10.0
     assert wanted(whole=0, mutes=10) == 0.0  # glossy
-    assert wanted(whole=0, given=1) > 10.0
+    assert wanted(0.5, whole=0, given=1) > 10.0
+
+
+def test_what_a_hand_put_there_is_nobodys_leg_once_nobody_is_near() -> None:
+    assert wanted(2.0, whole=0, given=1) == wanted(whole=0, given=1) == 0.0
+    assert wanted(0.5, unseen_s=5.0, whole=0, given=1) > 10.0  # he may still be there, hidden
 
 
 def test_whose_foot_it_was_has_gone_if_both_his_feet_are_seen_elsewhere() -> None:
