@@ -32,7 +32,8 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.bodies import predict
 from tms_agents.floor.build import SHOES
 from tms_agents.floor.landing import landing
-from tms_agents.floor.likelihood import UNLIKELY, costs, known
+from tms_agents.floor.likelihood import UNLIKELY
+from tms_agents.floor.nobodys import costs, known
 from tms_agents.floor.shine import scatter
 from tms_agents.simulation.floor_world import LASERS, SCENARIOS, FloorWorld
 
@@ -106,8 +107,8 @@ def choices(job: tuple[str, int, Any, str], duration: float | None = None) -> li
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
     told: list[Told] = []
 
-    def tell(most: int) -> Told:
-        told.append(Told(most, seed))
+    def tell(most: int, prints: int) -> Told:
+        told.append(Told(most, prints, seed))
         return told[-1]
 
     with patch("tms_agents.floor.estimator.Association", tell):
@@ -124,8 +125,8 @@ def choices(job: tuple[str, int, Any, str], duration: float | None = None) -> li
 class Told(Association):
     """Is told whose feet are whose; ``people`` and ``owners`` are the truth about the next scan."""
 
-    def __init__(self, most: int, seed: int) -> None:
-        super().__init__(most)
+    def __init__(self, most: int, prints: int, seed: int) -> None:
+        super().__init__(most, prints)
         self._seed = seed
         self._tracks: dict[int, int] = {}
         self.people: dict[int, tuple[float, float]] = {}

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, together, update
-from tms_agents.floor.likelihood import costs, too_wide
+from tms_agents.floor.likelihood import too_wide
 from tms_agents.floor.missing import expect, missed, out_of_reach
+from tms_agents.floor.nobodys import costs
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import learn
 

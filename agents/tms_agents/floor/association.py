@@ -14,7 +14,8 @@ from tms_agents.floor.bodies import predict
 from tms_agents.floor.build import agree
 from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
-from tms_agents.floor.likelihood import feet, known, nobodys
+from tms_agents.floor.likelihood import feet
+from tms_agents.floor.nobodys import goes_on, known, nobodys
 from tms_agents.floor.shine import expected, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
 
@@ -48,11 +49,14 @@ def _advance(
     t: float,
     sight: Any,
     taken: NDArray[np.bool_],
+    nobodys_at: Array,
+    spare_nobodys_at: Array,
 ) -> int:
     """One scan for all ``hypotheses`` (kept, n) of bodies, best first, with ``scores`` (kept,): how many there are.
 
     ``raw`` (kept, n, fields) are the same ``hypotheses`` as integers, ``pool`` is scratch for bodies. ``taken`` (m,)
-    becomes which clusters are somebody's in the best.
+    becomes which clusters are somebody's in the best. ``nobodys_at`` (kept, p) is when each print was last seen to be
+    nobody's who is believed.
     """
     n, m = hypotheses.shape[1], clusters.size
     most = count * (m + 1)
@@ -65,7 +69,7 @@ def _advance(
                 first[h, b] = first_like(raw, ALL, h, b)
                 alike[h, b] = first_like(raw, FEET, h, b)
     children = _propose(
-        hypotheses, alike, scores, clusters, of, marks, prints, t, child_score, child_parent, child_columns
+        hypotheses, alike, scores, clusters, of, marks, prints, t, nobodys_at, child_score, child_parent, child_columns
     )
     rows, other_of, scratch = np.empty(n, np.int64), np.empty(n, np.int64), np.empty((2, n))
     owned, free = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_), np.ones(m, np.bool_)
@@ -99,6 +103,10 @@ def _advance(
             last,
             pooled,
         )
+        spare_nobodys_at[kept] = nobodys_at[parent]
+        for i in range(m):
+            if free[i] and of[i] >= 0:
+                spare_nobodys_at[kept, of[i]] = t
         score = child_score[o] - least + complete(bodies, rows[:k], clusters, of, marks, free, blank, prints, t, sight)
         known_already = False
         for j in range(kept):
@@ -117,6 +125,7 @@ def _advance(
     for h in range(kept):
         source = best if h == 0 else (0 if h == best else h)
         copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h], True)
+        nobodys_at[h] = spare_nobodys_at[source]
     scores[0], scores[best] = scores[best], scores[0]
     scores[:kept] -= scores[0]
     for i in range(m):
@@ -134,6 +143,7 @@ def _propose(
     marks: Array,
     prints: Any,
     t: float,
+    nobodys_at: Array,
     child_score: Array,
     child_parent: NDArray[np.int64],
     child_columns: NDArray[np.int64],
@@ -168,6 +178,7 @@ def _propose(
             cost[:, 2 * column : 2 * column + 2] = told[like, row]
         nobodys(clusters, of, prints, bodies, rows[:k], t, cost[:, 2 * k :])
         known(clusters, bodies, t, cost[:, 2 * k :])
+        goes_on(clusters, of, prints, bodies, rows[:k], nobodys_at[h], t, cost[:, 2 * k :])
         of_column, u, v = np.empty(2 * k + m, np.int64), np.empty(m), np.empty(2 * k + m)
         best = solve(cost, columns, of_column, u, v)
         child_score[children], child_parent[children] = scores[h] + best, h
@@ -185,9 +196,9 @@ def _propose(
 
 
 class Association:
-    """The hypotheses about who is where; the best is ``bodies`` (n,) of `state.BODY`."""
+    """The hypotheses about who is where; the best is ``bodies`` (``most``,) of `state.BODY`; so many ``prints``."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, prints: int) -> None:
         self._hypotheses, self._spare = empty(BODY, (_KEPT, most)), empty(BODY, (_KEPT, most))
         self._pool = empty(BODY, _POOL)
         # All fields are as long as an integer: what is the same to the last bit is found by these.
@@ -195,6 +206,7 @@ class Association:
         self._before, self._decided = np.zeros_like(self._raw[0]), np.zeros(most, np.bool_)
         self._beliefs, self._spare_beliefs = np.zeros((_KEPT, most, most)), np.zeros((_KEPT, most, most))
         self._beliefs[:] = np.eye(most)
+        self._nobodys_at, self._spare_nobodys_at = np.full((_KEPT, prints), -1e9), np.full((_KEPT, prints), -1e9)
         self._names = np.zeros(most, np.int64)
         self._scores = np.zeros(_KEPT)
         self._count = 1
@@ -224,6 +236,8 @@ class Association:
             t,
             sight,
             taken,
+            self._nobodys_at,
+            self._spare_nobodys_at,
         )
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return taken
@@ -249,7 +263,14 @@ class Association:
         """What has changed since `mark` is so in all hypotheses in which it was as in the best."""
         if self._count > 1:
             self._count = settle(
-                self._hypotheses, self._raw, self._before, self._decided, self._scores, self._beliefs, self._count
+                self._hypotheses,
+                self._raw,
+                self._before,
+                self._decided,
+                self._scores,
+                self._beliefs,
+                self._nobodys_at,
+                self._count,
             )
 
     def named(self, index: int, lost: tuple[float, float] | None = None) -> None:
@@ -281,6 +302,7 @@ class Association:
             "bodies": pack(self._hypotheses[:n]),
             "beliefs": pack(self._beliefs[:n]),
             "scores": pack(self._scores[:n]),
+            "nobodys_at": pack(self._nobodys_at[:n]),
             "scattered": pack(self.scattered),
         }
 
@@ -290,6 +312,11 @@ class Association:
         if not 1 <= n <= _KEPT:
             raise ValueError("the saved state of the floor estimator has an impossible number of hypotheses")
         self._count = n
-        for name, array in (("bodies", self._hypotheses), ("beliefs", self._beliefs), ("scores", self._scores)):
+        for name, array in (
+            ("bodies", self._hypotheses),
+            ("beliefs", self._beliefs),
+            ("scores", self._scores),
+            ("nobodys_at", self._nobodys_at),
+        ):
             array[:n] = unpack(saved[name], array[:n])
         self.scattered[:] = unpack(saved["scattered"], self.scattered)

@@ -44,8 +44,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 10: for how long a print was all that was seen of somebody.
-_FORMAT = 10
+#: Of saved states; 11: when prints were nobody's in each hypothesis.
+_FORMAT = 11
 
 
 class FloorEstimator:
@@ -65,7 +65,7 @@ class FloorEstimator:
         self._masks = Masks(self._scene.region, self._scene.masks, self._scene.gates)
         self._gates = Area(self._scene.gates)
         self._prints = empty(PRINT, _PRINTS)
-        self._association = Association(_BODIES)
+        self._association = Association(_BODIES, _PRINTS)
         self._shoes = legs()
         self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)

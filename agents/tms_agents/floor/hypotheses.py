@@ -99,12 +99,14 @@ def settle(
     decided: NDArray[np.bool_],
     scores: Array,
     beliefs: Array,
+    nobodys_at: Array,
     count: int,
 ) -> int:
     """What became of bodies of the best hypothesis holds in all in which they were the same: how many there are.
 
     Hypotheses (kept, n), as integers ``raw`` (kept, n, fields); bodies of the best as they were ``before`` (n, fields).
-    Hypotheses in which one is another that is ``decided`` (n,) are dropped; ``scores`` and ``beliefs`` move along.
+    Hypotheses in which one is another that is ``decided`` (n,) are dropped; ``scores``, ``beliefs`` and
+    ``nobodys_at`` move along.
     """
     n = hypotheses.shape[1]
     kept = 1
@@ -117,6 +119,7 @@ def settle(
         if kept < h:
             copy(hypotheses[h], beliefs[h], hypotheses[kept], beliefs[kept], True)
             scores[kept] = scores[h]
+            nobodys_at[kept] = nobodys_at[h]
         for b in range(n):
             if hypotheses[kept, b].used and _equal(raw[kept, b], before[b], FEET):
                 for field in FOUND:

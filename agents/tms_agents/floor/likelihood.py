@@ -1,4 +1,4 @@
-"""How likely a cluster is to be somebody's foot: one that stands, swings, or has landed; or nobody's."""
+"""How likely a cluster is to be somebody's foot: one that stands, swings, or has landed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from tms_agents.floor.build import (
 )
 from tms_agents.floor.landing import landing
 from tms_agents.floor.prints import lay_before
-from tms_agents.floor.segmentation import BRIDGE
 from tms_agents.floor.shine import unlike
 
 Array = NDArray[np.float64]
@@ -31,7 +30,7 @@ UNLIKELY = 1e6
 #: Feet are so far from the body along its way and aside (m); nobody's foot is farther away than this.
 _ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
 #: Time for which a new print counts as a fresh step (s).
-_FRESH_S = 1.0
+FRESH_S = 1.0
 #: Two feet side by side are hardly wider (m).
 _BROAD_M = 0.45
 #: What is seen of a robot is so near its edge (m), if it was seen so long ago (s) at most.
@@ -49,18 +48,12 @@ _LEFT_S, _LEFT = 1.0, 0.5
 _ROLL_M, _ROLLED_M = 0.08, 0.17
 #: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
 #: alike.
-_LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
+LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
 #: The same of the length of a shoe; the sine of how far it points from the way.
 _SOLE_M, _TURNED = 0.015, 0.5
 #: Negative log likelihood of a foot wider than a leg although the other one is elsewhere: up to as wide as two legs
 #: side by side (m), and wider; or longer than a shoe.
 _PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
-#: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
-#: somebody new known already, and what has rested there as nobody's.
-_NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
-#: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
-#: at most if nothing nearer is seen there: something dark did not echo.
-_PART, _FEW, _FADED = 2.0, 2, 4
 
 
 @njit(cache=True)
@@ -106,7 +99,7 @@ def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float,
 @njit(cache=True)
 def _stouter(body: Any, c: Any) -> float:
     """Negative log likelihood of a leg being so much wider or narrower than those of the one who has the name."""
-    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > _LEG_M:
+    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > LEG_M:
         return 0.0
     return float(0.5 * min(((c.width - body.own_girth) / _GIRTH_M) ** 2, _OTHER))
 
@@ -116,7 +109,7 @@ def too_wide(body: Any, c: Any) -> float:
     """Negative log likelihood of one foot looking so wide: of a shoe, or of a leg, where two may be side by side."""
     if body.shoe >= SHOES:
         return _TOO_WIDE if wears_shoes(body) and c.width > LONGEST_SHOE_M else 0.0
-    if body.own_girth_n < LEGS_KNOWN or c.width <= _LEG_M:
+    if body.own_girth_n < LEGS_KNOWN or c.width <= LEG_M:
         return 0.0
     return _PAIR if c.width < _PAIR_M else _TOO_WIDE
 
@@ -135,23 +128,6 @@ def _another_shoe(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
-def _part(clusters: Any, i: int, longest: float) -> bool:
-    """Whether cluster i may be the smaller part of a foot, ``longest`` m at most, whose middle something hides."""
-    c = clusters[i]
-    for o in range(clusters.size):
-        p = clusters[o]
-        if o == i or p.mirror != c.mirror or p.width < c.width or (p.width == c.width and o > i):
-            continue
-        between = max(c.first - p.last, p.first - c.last) - 1
-        if not _FEW <= between <= BRIDGE:
-            continue
-        hidden = c.cut != 0 and p.cut != 0
-        if (hidden or between <= _FADED) and np.hypot(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width) < longest:
-            return True
-    return False
-
-
-@njit(cache=True)
 def waits(body: Any, c: Any) -> bool:
     """Whether the cluster is where a foot of the body stood when it was lost sight of."""
     if not body.stale or body.robot or max(body.a_seen, body.b_seen) < 0.0:
@@ -164,64 +140,6 @@ def waits(body: Any, c: Any) -> bool:
 def _strides(body: Any, c: Any) -> float:
     """How far (m) the nearer foot of the body would have to step to the cluster."""
     return float(min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by)))
-
-
-@njit(cache=True)
-def costs(
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    prints: Any,
-    bodies: Any,
-    rows: NDArray[np.int64],
-    t: float,
-    cost: Array,
-) -> None:
-    """Fill ``cost`` (m, 2k + m): negative log likelihoods of the clusters (m,) being feet of the bodies ``rows`` (k,).
-
-    A foot goes on standing where it stood, or it has stepped: then it lands near the body. Only a fresh print can be
-    a step: what has stood there for long is no foot. The last m columns are for clusters that are nobody's: a fresh
-    one is somebody new, which is rare; an old one may well be something that was put down.
-    """
-    k = rows.size
-    for column in range(k):
-        feet(clusters, of, marks, free, prints, bodies, rows[column], t, cost[:, 2 * column : 2 * column + 2])
-    nobodys(clusters, of, prints, bodies, rows, t, cost[:, 2 * k :])
-
-
-@njit(cache=True)
-def nobodys(
-    clusters: Any,
-    of: NDArray[np.int64],
-    prints: Any,
-    bodies: Any,
-    rows: NDArray[np.int64],
-    t: float,
-    cost: Array,
-) -> None:
-    """Fill ``cost`` (m, m): on its diagonal what it costs that a cluster is a foot of none of the bodies ``rows``."""
-    m, k = clusters.size, rows.size
-    shod = False
-    for column in range(k):
-        shod = shod or bodies[rows[column]].shoe >= SHOES
-    for i in range(m):
-        c = clusters[i]
-        cost[i, :] = UNLIKELY
-        age = t - prints[of[i]].first if of[i] >= 0 else 0.0
-        cost[i, i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
-        if age > _FRESH_S and c.width < WIDE_M and not narrow(c) and not c.attached:
-            # What was nobody's stays nobody's.
-            stands = False
-            for column in range(k):
-                body = bodies[rows[column]]
-                stands = stands or body.a_print == of[i] or body.b_print == of[i] or waits(body, c)
-                part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
-                stands = stands or part
-            if not stands:
-                cost[i, i] = _RESTS
-        if _part(clusters, i, LONGEST_SHOE_M if shod else _LEG_M):
-            cost[i, i] = min(cost[i, i], _PART)
 
 
 @njit(cache=True)
@@ -260,7 +178,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         return
     q = prints[print_] if print_ >= 0 else prints[0]
     age = t - q.first if print_ >= 0 else 0.0
-    if body.stale and age > _FRESH_S and not waits(body, c):
+    if body.stale and age > FRESH_S and not waits(body, c):
         return
     if print_ >= 0 and lay_before(q, body):
         return
@@ -301,12 +219,12 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
             x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
             ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
             landed, beside = body.b_land, body.b_print
-            left = t - body.a_since > _LEFT_S and t - body.b_since < _FRESH_S
+            left = t - body.a_since > _LEFT_S and t - body.b_since < FRESH_S
         else:
             x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
             ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
             landed, beside = body.a_land, body.a_print
-            left = t - body.b_since > _LEFT_S and t - body.a_since < _FRESH_S
+            left = t - body.b_since > _LEFT_S and t - body.a_since < FRESH_S
         gap = t - seen
         off = (c.x - x) ** 2 + (c.y - y) ** 2
         value = UNLIKELY
@@ -338,7 +256,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         if age > gap + 0.15 and (not lately or (body.shoe >= SHOES and beside == print_)):
             # Whatever stands here came while this foot was somewhere else.
             step += _STOLEN
-        if age >= _FRESH_S and q.owner != row and not lately:
+        if age >= FRESH_S and q.owner != row and not lately:
             # What has stood there for long is hardly a foot, except that of somebody who stands.
             value = min(value, step + 2.5)
         else:
@@ -347,29 +265,3 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
                 side = body.side if which == 0 else -body.side
                 value = min(value, _strides_on(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
         cost[which] = shape + value
-
-
-@njit(cache=True)
-def _beside(body: Any, bodies: Any, c: Any) -> bool:
-    """Whether a mover that is believed is so near that its feet may be taken for another body: not what it pushes."""
-    if body.from_furniture == 1:
-        return False
-    for b in range(bodies.size):
-        other = bodies[b]
-        near = other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6
-        if near and too_wide(other, c) == 0.0:
-            return True
-    return False
-
-
-@njit(cache=True)
-def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
-    """Lower the ``cost`` (m, m) of being nobody's of clusters that go on with somebody new who is not believed yet."""
-    for i in range(clusters.size):
-        c = clusters[i]
-        for b in range(bodies.size):
-            body = bodies[b]
-            if body.used and not body.confirmed and t - body.seen < 0.5 and not _beside(body, bodies, c):
-                near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
-                near = max(min(near, np.hypot(c.x - body.x, c.y - body.y)) - 0.1, 0.0)
-                cost[i, i] = min(cost[i, i], _TENTATIVE + 0.5 * (near / 0.2) ** 2)

@@ -12,7 +12,7 @@ from tms_agents.devices.scans import Sweep
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
 from tms_agents.floor.dark import dark_width
 from tms_agents.floor.freespace import look
-from tms_agents.floor.likelihood import costs
+from tms_agents.floor.nobodys import costs
 from tms_agents.floor.prints import follow
 
 _BEAMS, _HZ = 128, 20

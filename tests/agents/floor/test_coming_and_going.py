@@ -15,9 +15,9 @@ from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
 from tms_agents.floor.events import Back, Stale
 from tms_agents.floor.freespace import vacant
-from tms_agents.floor.likelihood import costs
 from tms_agents.floor.masks import Masks
 from tms_agents.floor.missing import missed
+from tms_agents.floor.nobodys import costs
 from tms_agents.floor.review import CONFIRM, GONE, NOTHING, review
 from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
 from tms_agents.floor.state import BODY, PRINT, empty
@@ -32,7 +32,7 @@ OPEN = (np.full(101, 8.0), np.full(101, BACKGROUND, np.int8), np.full(101, 8.0),
 
 
 def tracks(gates: list[list[tuple[float, float]]], region: list[tuple[float, float]] | None = None) -> Tracks:
-    return Tracks(Association(2), FloorSettings(), Scene(region=region, gates=gates))
+    return Tracks(Association(2, 1), FloorSettings(), Scene(region=region, gates=gates))
 
 
 def at(one: Tracks, t: float) -> list:

@@ -9,7 +9,8 @@ import pytest
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, FloorSettings, Scene
-from tms_agents.floor.likelihood import UNLIKELY, costs, known, too_wide
+from tms_agents.floor.likelihood import UNLIKELY, too_wide
+from tms_agents.floor.nobodys import costs, known
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.putting import count_feet
 from tms_agents.floor.segmentation import CLUSTER

@@ -7,7 +7,7 @@ import pytest
 
 from tms_agents.floor.build import beat, size_up
 from tms_agents.floor.identity import alike, christen, renamed, unite
-from tms_agents.floor.likelihood import costs
+from tms_agents.floor.nobodys import costs
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, learn
 from tms_agents.floor.state import BODY, PRINT, empty

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.floor.likelihood import costs
+from tms_agents.floor.nobodys import costs, goes_on
 from tms_agents.floor.segmentation import CLUSTER, FADES
 from tms_agents.floor.state import BODY, PRINT, empty
 
@@ -88,3 +88,21 @@ def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ag
     costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, t, cost)
     landed, stands = cost[0, 0], cost[0, 1]
     assert stands < landed - 2.0
+
+
+@pytest.mark.parametrize(
+    ("shoe", "since", "nobodys_at", "costs_less"),
+    [
+        (1.0, 1.0, 4.9, True),
+        (1.0, 1.0, 4.5, False),  # somebody's since
+        (1.0, 4.95, 4.9, False),  # that was another print
+        (0.0, 1.0, 4.9, False),  # legs
+    ],
+)
+def test_whoever_came_unknown_is_paid_for_once(shoe: float, since: float, nobodys_at: float, costs_less: bool) -> None:
+    bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["shoe"], prints["used"], prints["first"] = shoe, 1, since
+    cost, one = np.full((1, 1), 11.0), np.zeros(1, np.int64)
+    goes_on(clusters, one, prints, bodies, one, np.array([nobodys_at]), 5.0, cost)
+    assert bool(cost[0, 0] < 5.0) == costs_less

@@ -1,0 +1,158 @@
+"""What it costs that a cluster is nobody's foot, but somebody new, a thing, or nothing; and the table of all costs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.bodies import WIDE_M, narrow
+from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
+from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
+from tms_agents.floor.segmentation import BRIDGE
+
+Array = NDArray[np.float64]
+
+#: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
+#: somebody new known already, and what has rested there as nobody's.
+_NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
+#: A shoe that was nobody's just before (within s): whoever came is paid for once, not in every scan.
+_GOES_ON, _BEFORE_S = 4.0, 0.35
+#: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
+#: at most if nothing nearer is seen there: something dark did not echo.
+_PART, _FEW, _FADED = 2.0, 2, 4
+
+
+@njit(cache=True)
+def costs(
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    prints: Any,
+    bodies: Any,
+    rows: NDArray[np.int64],
+    t: float,
+    cost: Array,
+) -> None:
+    """Fill ``cost`` (m, 2k + m): negative log likelihoods of the clusters (m,) being feet of the bodies ``rows`` (k,).
+
+    A foot goes on standing where it stood, or it has stepped: then it lands near the body. Only a fresh print can be
+    a step: what has stood there for long is no foot. The last m columns are for clusters that are nobody's: a fresh
+    one is somebody new, which is rare; an old one may well be something that was put down.
+    """
+    k = rows.size
+    for column in range(k):
+        feet(clusters, of, marks, free, prints, bodies, rows[column], t, cost[:, 2 * column : 2 * column + 2])
+    nobodys(clusters, of, prints, bodies, rows, t, cost[:, 2 * k :])
+
+
+@njit(cache=True)
+def nobodys(
+    clusters: Any,
+    of: NDArray[np.int64],
+    prints: Any,
+    bodies: Any,
+    rows: NDArray[np.int64],
+    t: float,
+    cost: Array,
+) -> None:
+    """Fill ``cost`` (m, m): on its diagonal what it costs that a cluster is a foot of none of the bodies ``rows``."""
+    m, k = clusters.size, rows.size
+    longest = LONGEST_SHOE_M if _shod(bodies, rows) else LEG_M
+    for i in range(m):
+        c = clusters[i]
+        cost[i, :] = UNLIKELY
+        age = t - prints[of[i]].first if of[i] >= 0 else 0.0
+        cost[i, i] = _CLUTTER if narrow(c) or c.attached else _NOBODY - _THING * min(max(age - 0.3, 0.0), 1.0)
+        if age > FRESH_S and c.width < WIDE_M and not narrow(c) and not c.attached:
+            # What was nobody's stays nobody's.
+            stands = False
+            for column in range(k):
+                body = bodies[rows[column]]
+                stands = stands or body.a_print == of[i] or body.b_print == of[i] or waits(body, c)
+                part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
+                stands = stands or part
+            if not stands:
+                cost[i, i] = _RESTS
+        if _part(clusters, i, longest):
+            cost[i, i] = min(cost[i, i], _PART)
+
+
+@njit(cache=True)
+def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
+    """Lower the ``cost`` (m, m) of being nobody's of clusters that go on with somebody new who is not believed yet."""
+    for i in range(clusters.size):
+        c = clusters[i]
+        for b in range(bodies.size):
+            body = bodies[b]
+            if body.used and not body.confirmed and t - body.seen < 0.5 and not _beside(body, bodies, c):
+                near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
+                near = max(min(near, np.hypot(c.x - body.x, c.y - body.y)) - 0.1, 0.0)
+                cost[i, i] = min(cost[i, i], _TENTATIVE + 0.5 * (near / 0.2) ** 2)
+
+
+@njit(cache=True)
+def goes_on(
+    clusters: Any,
+    of: NDArray[np.int64],
+    prints: Any,
+    bodies: Any,
+    rows: NDArray[np.int64],
+    nobodys_at: Array,
+    t: float,
+    cost: Array,
+) -> None:
+    """Lower the ``cost`` (m, m) of being nobody's of clusters on prints that were so just before, if people wear shoes.
+
+    ``nobodys_at`` (p,) is when each print was nobody's last, in the hypothesis in which ``rows`` (k,) are who is there.
+    Else a hypothesis in which somebody unknown stands there costs more with every scan, until it is given up, and
+    one of his neighbours has his feet.
+    """
+    if not _shod(bodies, rows):
+        return
+    for i in range(clusters.size):
+        p = of[i]
+        if p >= 0 and nobodys_at[p] >= prints[p].first and t - nobodys_at[p] < _BEFORE_S:
+            cost[i, i] = min(cost[i, i], _GOES_ON)
+
+
+@njit(cache=True)
+def _beside(body: Any, bodies: Any, c: Any) -> bool:
+    """Whether a mover that is believed is so near that its feet may be taken for another body: not what it pushes."""
+    if body.from_furniture == 1:
+        return False
+    for b in range(bodies.size):
+        other = bodies[b]
+        near = other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6
+        if near and too_wide(other, c) == 0.0:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _part(clusters: Any, i: int, longest: float) -> bool:
+    """Whether cluster i may be the smaller part of a foot, ``longest`` m at most, whose middle something hides."""
+    c = clusters[i]
+    for o in range(clusters.size):
+        p = clusters[o]
+        if o == i or p.mirror != c.mirror or p.width < c.width or (p.width == c.width and o > i):
+            continue
+        between = max(c.first - p.last, p.first - c.last) - 1
+        if not _FEW <= between <= BRIDGE:
+            continue
+        hidden = c.cut != 0 and p.cut != 0
+        if (hidden or between <= _FADED) and np.hypot(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width) < longest:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _shod(bodies: Any, rows: NDArray[np.int64]) -> bool:
+    """Whether any of the bodies ``rows`` (k,) shows shoes."""
+    shod = False
+    for row in rows:
+        shod = shod or bodies[row].shoe >= SHOES
+    return shod
