@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
 #: A shoe that was nobody's just before (within s): whoever came is paid for once, not in every scan.
-_GOES_ON, _BEFORE_S = 4.0, 0.35
+_GOES_ON, _BEFORE_S = 5.0, 0.35
 #: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
 #: at most if nothing nearer is seen there: something dark did not echo.
 _PART, _FEW, _FADED = 2.0, 2, 4

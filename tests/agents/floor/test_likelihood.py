@@ -105,4 +105,4 @@ def test_whoever_came_unknown_is_paid_for_once(shoe: float, since: float, nobody
     bodies["shoe"], prints["used"], prints["first"] = shoe, 1, since
     cost, one = np.full((1, 1), 11.0), np.zeros(1, np.int64)
     goes_on(clusters, one, prints, bodies, one, np.array([nobodys_at]), 5.0, cost)
-    assert bool(cost[0, 0] < 5.0) == costs_less
+    assert bool(cost[0, 0] < 11.0) == costs_less
