@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
-#: A shoe that was nobody's just before (within s): whoever came is paid for once, not in every scan.
+#: A shoe that was nobody's just before (within s): less than somebody new, who is paid for once.
 _GOES_ON, _BEFORE_S = 5.0, 0.35
 #: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
 #: at most if nothing nearer is seen there: something dark did not echo.
