@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.adopting import BLANK, adopt_from, chosen, complete
 from tms_agents.floor.assignment import reassign, solve
-from tms_agents.floor.bodies import predict
+from tms_agents.floor.bodies import begin, predict
 from tms_agents.floor.build import agree
 from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 _KEPT, _WORSE, _BRANCH = 14, 18.0, 10.0
 #: Of a scan so many bodies that took the same feet are kept, to be copied.
 _POOL = 256
+#: Who began so near (m) the end of a robot is a part of it.
+_BEGAN_M = 0.1
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
 OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
 NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
@@ -289,6 +291,35 @@ class Association:
             for field in NAMED:
                 bodies[field][changed] = bodies[field][source]
             belief[:, changed] = belief[:, source]
+
+    @property
+    def hypotheses(self) -> Any:
+        """All that are kept, (h, ``most``) of `state.BODY`, the best first."""
+        return self._hypotheses[: self._count]
+
+    def robot(self, index: int, footprint: Any, number: int, t: float) -> int:
+        """The mover at ``index`` (-1: a new one) is the robot of the ``footprint`` (`state.FOOTPRINT`) of this number.
+
+        Which it is; -1 where there is no room for a new one.
+        """
+        everywhere = self.hypotheses
+        # Whoever began there and is not believed yet is this robot.
+        away = np.hypot(everywhere["x"] - footprint["x"], everywhere["y"] - footprint["y"])
+        everywhere["used"][(everywhere["confirmed"] == 0) & (away < footprint["a"] + _BEGAN_M)] = 0
+        if index < 0:
+            free = np.flatnonzero(~everywhere["used"].any(axis=0))
+            if not free.size:
+                return -1
+            index = int(free[0])
+            for bodies in everywhere:
+                begin(bodies[index], BLANK[0], -1, t)
+            new = everywhere[:, index]
+            for name in ("x0", "y0", "first"):
+                new[name] = footprint[name]
+            for name in ("hits", "looks", "due"):
+                new[name] = footprint["hits"]
+        everywhere["footprint"][:, index] = number
+        return index
 
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""

@@ -90,6 +90,7 @@ def together(body: Any, clusters: Any, i: int, t: float) -> bool:
 def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     """A new tentative body at the cluster c."""
     body.used, body.confirmed, body.label, body.robot, body.stale, body.machine = 1, 0, -1, 0, 0, 0
+    body.footprint = 0
     body.x, body.y, body.vx, body.vy = c.x, c.y, 0.0, 0.0
     body.pp, body.pv, body.vv = 0.04, 0.0, 0.8
     body.at, body.first, body.seen = t, t, t

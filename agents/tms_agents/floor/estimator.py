@@ -13,6 +13,7 @@ from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.build import count_shoes, legs
 from tms_agents.floor.dark import dark_width
 from tms_agents.floor.events import FloorEvent, FloorLabel
+from tms_agents.floor.footprints import Footprints
 from tms_agents.floor.freespace import LOOK, claim, guard, look
 from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
@@ -44,8 +45,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 11: when prints were nobody's in each hypothesis.
-_FORMAT = 11
+#: Of saved states; 12: robots' footprints.
+_FORMAT = 12
 
 
 class FloorEstimator:
@@ -70,6 +71,7 @@ class FloorEstimator:
         self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
+        self._footprints = Footprints(self._scene.robots, self._gates, self._association)
         self._robots = sizes(self._scene.robots)
         self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
         self._looks = np.zeros(_THINGS, LOOK)
@@ -131,6 +133,7 @@ class FloorEstimator:
             self._looks,
         )
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
+        clusters = clusters[: self._footprints.step(view, clusters, t, lambda: self._pieces(t))]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, *view.sight)
@@ -162,7 +165,7 @@ class FloorEstimator:
             dt,
             view.sight,
             self._new_label,
-            lambda body: self._furniture.was(body, self._pieces(t)),
+            lambda body: self._furniture.was(body, float(body["far"]), self._pieces(t)),
             learned=view.background.learned,
         )
         self._association.settle()
@@ -255,6 +258,7 @@ class FloorEstimator:
             "robot_at": self._objects.robot_at if np.isfinite(self._objects.robot_at) else None,
             "furniture": self._furniture.save(),
             "legs": self._furniture.legs,
+            "footprints": self._footprints.save(),
             "extrinsics": self._extrinsics.save(),
             "labels": self._labels,
             "t": self._t if np.isfinite(self._t) else None,
@@ -301,6 +305,7 @@ class FloorEstimator:
             self._objects.robot_at = -np.inf if state["robot_at"] is None else float(state["robot_at"])
             self._furniture.restore(state["furniture"])
             self._furniture.legs = [(float(t), float(x), float(y)) for t, x, y in state.get("legs", ())]
+            self._footprints.restore(state["footprints"])
             self._extrinsics.restore(state["extrinsics"])
             self._labels = int(state["labels"])
             self._t = -np.inf if state["t"] is None else float(state["t"])

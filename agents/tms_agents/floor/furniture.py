@@ -191,13 +191,12 @@ class Furniture:
         return True
 
     @staticmethod
-    def was(body: Any, pieces: list[Piece]) -> bool:
-        """Whether the body began where a piece of background about as wide has gone at that time."""
-        width = float(body["far"])
+    def was(begun: Any, width: float, pieces: list[Piece]) -> bool:
+        """Whether what has ``begun`` (first, x0, y0) began where a piece of background about as wide has gone then."""
         return any(
-            math.hypot(piece.x - body["x0"], piece.y - body["y0"]) < _PUSHED_M
+            math.hypot(piece.x - begun["x0"], piece.y - begun["y0"]) < _PUSHED_M
             and 0.5 * width < piece.width < 1.5 * width
-            and abs(piece.t - body["first"]) < _GROUP_S
+            and abs(piece.t - begun["first"]) < _GROUP_S
             for piece in pieces
         )
 

@@ -173,6 +173,9 @@ def feet(
 @njit(cache=True)
 def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t: float, cost: Array) -> None:
     """Lower ``cost`` (2,) to that of the cluster c, on ``print_`` (-1: none), being the first and the second foot."""
+    if body.footprint:
+        # What is its own is known (`footprints`).
+        return
     away = np.hypot(c.x - body.x, c.y - body.y)
     if away > _REACH_M + 1.5 * np.sqrt(body.pp):
         return

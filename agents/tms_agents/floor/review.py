@@ -69,6 +69,8 @@ _LOOKS, _LOOK_M = 4, 0.5
 #: Two of whom so near each other (m) one foot alone is seen are one, if the younger has shown two in less than this
 #: share of the scans.
 _UNITE_M, _BOTH = 0.45, 0.25
+#: A robot of known outline is looked for behind others for so long (s).
+_BEHIND_S = 4.0
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
 
@@ -227,6 +229,9 @@ def review(
                 continue
             if unseen > 0.0:
                 continue
+            if body.footprint:
+                actions[b] = CONFIRM
+                continue
             beside, halved, part = np.inf, False, False
             for o in range(bodies.size):
                 if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
@@ -288,7 +293,7 @@ def review(
             elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
                 actions[b] = MOVED
             continue
-        if unseen > 0.12:
+        if unseen > (_BEHIND_S if body.footprint else 0.12):
             view = clear(body.x, body.y, 0.15, ranges, states, longest, pose, first, step)
             if view == FREE:
                 body.clear += dt

@@ -58,7 +58,7 @@ def gather(clusters: Any, bodies: Any, most: float, t: float) -> int:
     m: int = clusters.size
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.machine or t - body.seen > 2.0:
+        if not body.used or not body.machine or body.footprint or t - body.seen > 2.0:
             continue
         dt = t - body.at
         x, y = body.x + dt * body.vx, body.y + dt * body.vy

@@ -73,6 +73,7 @@ BODY = np.dtype(
         ("label", "i8"),
         ("robot", "i8"),
         ("machine", "i8"),
+        ("footprint", "i8"),
         ("stale", "i8"),
         ("x", "f8"),
         ("y", "f8"),
@@ -165,6 +166,35 @@ BODY = np.dtype(
         ("look", "f8"),
         ("look_n", "i8"),
         ("sure", "f8"),
+    ]
+)
+
+#: A robot of known size, or what may be one: whether it is (sure), which body it is (-1: none), where it is (m), its
+#: yaw and velocity (m/s), half its length and width (a, b, m), since when, when it was seen and when it was looked for
+#: last, in how many scans it was seen, where it began, for which share of its way a person was beside it (pushed), how
+#: far (m) it has gone since with nobody there (alone), how well it fits in the mean, 0 to 1, and whether it was going.
+FOOTPRINT = np.dtype(
+    [
+        ("used", "i8"),
+        ("sure", "i8"),
+        ("body", "i8"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("yaw", "f8"),
+        ("vx", "f8"),
+        ("vy", "f8"),
+        ("a", "f8"),
+        ("b", "f8"),
+        ("first", "f8"),
+        ("seen", "f8"),
+        ("at", "f8"),
+        ("hits", "i8"),
+        ("x0", "f8"),
+        ("y0", "f8"),
+        ("pushed", "f8"),
+        ("alone", "f8"),
+        ("fits", "f8"),
+        ("going", "i8"),
     ]
 )
 
