@@ -47,12 +47,18 @@ LOOK = np.dtype(
 
 
 @njit(cache=True)
-def beam_of(bearing: float, first: float, step: float, n: int) -> float:
-    """Index (fraction) of the beam at ``bearing`` rad, of n beams from ``first`` on every ``step`` rad; NaN: none."""
+def index_of(bearing: float, first: float, step: float, n: int) -> float:
+    """Index (fraction) of the beam at ``bearing`` rad, of n from ``first`` every ``step`` rad, were they all round."""
     middle = first + 0.5 * step * (n - 1)
     off: float = bearing - middle
     off -= 2.0 * np.pi * np.round(off / (2.0 * np.pi))
-    index = off / step + 0.5 * (n - 1)
+    return off / step + 0.5 * (n - 1)
+
+
+@njit(cache=True)
+def beam_of(bearing: float, first: float, step: float, n: int) -> float:
+    """As `index_of`; NaN where there is no beam."""
+    index = index_of(bearing, first, step, n)
     if index < -0.5 or index > n - 0.5:
         return float(np.nan)
     return index

@@ -16,11 +16,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.background import FOREGROUND
+from tms_agents.floor.freespace import index_of
 
 Array = NDArray[np.float64]
 
 #: A point belongs to a face within this (m); what is so far (m) behind a face has passed through it.
-ON_M, _THROUGH_M = 0.06, 0.12
+_ON_M, _THROUGH_M = 0.06, 0.12
 #: A point tells of a face as well as this (m), and of points alike so many count; a passing beam of a corner (m).
 _FACE_M, _COUNT, _MORE, _CORNER_M = 0.03, 4.0, 10.0, 0.03
 #: Points so far (m) from the outline are looked at.
@@ -58,7 +59,7 @@ def _enters(sx: float, sy: float, dx: float, dy: float, a: float, b: float) -> t
 
 
 @njit(cache=True)
-def offset(u: float, v: float, su: float, sv: float, a: float, b: float) -> tuple[float, float]:
+def _offset(u: float, v: float, su: float, sv: float, a: float, b: float) -> tuple[float, float]:
     """How far (m, along both axes) the point (u, v) is from the nearest face that is seen from (su, sv); inf: none."""
     best, eu, ev = np.inf, np.inf, np.inf
     if abs(su) > a:
@@ -75,14 +76,12 @@ def offset(u: float, v: float, su: float, sv: float, a: float, b: float) -> tupl
 
 
 @njit(cache=True)
-def window(x: float, y: float, radius: float, pose: Array, first: float, step: float, n: int) -> tuple[int, int]:
+def _window(x: float, y: float, radius: float, pose: Array, first: float, step: float, n: int) -> tuple[int, int]:
     """The beams from and to (exclusive) that may meet a disc; none where the sensor is in it."""
     away = math.hypot(x - pose[0], y - pose[1])
     if away <= radius:
         return 0, 0
-    turned = math.atan2(y - pose[1], x - pose[0]) - pose[2] - (first + 0.5 * (n - 1) * step)
-    turned = math.atan2(math.sin(turned), math.cos(turned))
-    middle = turned / step + 0.5 * (n - 1)
+    middle = index_of(math.atan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
     half = math.asin(radius / away) / abs(step)
     return max(0, math.ceil(middle - half)), min(n, math.floor(middle + half) + 1)
 
@@ -108,7 +107,7 @@ def fit(
     It was expected there by ``spread_m`` m and ``spread`` rad (standard deviations). ``how`` (6,) counts `ON` to `ALL`.
     """
     x0, y0, yaw0 = at
-    lo, hi = window(x0, y0, math.hypot(a, b) + _NEAR_M, pose, first, step, ranges.size)
+    lo, hi = _window(x0, y0, math.hypot(a, b) + _NEAR_M, pose, first, step, ranges.size)
     matrix, right = np.empty((3, 3)), np.empty(3)
     for turn in range(rounds + 1):
         x, y, c, s = at[0], at[1], math.cos(at[2]), math.sin(at[2])
@@ -126,12 +125,12 @@ def fit(
             if np.isinf(r):
                 continue
             u, v = su + r * du, sv + r * dv
-            eu, ev = offset(u, v, su, sv, a, b)
+            eu, ev = _offset(u, v, su, sv, a, b)
             off = math.hypot(eu, ev)
             new = states[i] == FOREGROUND
             if new and off < _NEAR_M and not (enters < np.inf and r > leaves):
                 inside = abs(u) < a and abs(v) < b
-                how[ON if off < ON_M else INSIDE if inside else BESIDE] += 1.0
+                how[ON if off < _ON_M else INSIDE if inside else BESIDE] += 1.0
                 weight = 1.0 / (1.0 + (off / _OFF_M) ** 2) ** 2
                 _add(matrix, right, eu, ev, u, v, weight / _FACE_M**2)
             elif enters < np.inf and r < enters:
@@ -253,6 +252,6 @@ def share_of(c: Any, at: Array, a: float, b: float, ranges: Array, rays: Array, 
             continue
         n += 1
         px, py = pose[0] + r * rays[i, 2] - x, pose[1] + r * rays[i, 3] - y
-        eu, ev = offset(co * px + s * py, co * py - s * px, su, sv, a, b)
-        on += math.hypot(eu, ev) < ON_M
+        eu, ev = _offset(co * px + s * py, co * py - s * px, su, sv, a, b)
+        on += math.hypot(eu, ev) < _ON_M
     return on / max(n, 1)
