@@ -34,6 +34,7 @@ from tms_agents.floor.build import SHOES
 from tms_agents.floor.landing import landing
 from tms_agents.floor.likelihood import UNLIKELY
 from tms_agents.floor.nobodys import costs, known
+from tms_agents.floor.settings import Polygon
 from tms_agents.floor.shine import scatter
 from tms_agents.simulation.floor_world import LASERS, SCENARIOS, FloorWorld
 
@@ -107,8 +108,8 @@ def choices(job: tuple[str, int, Any, str], duration: float | None = None) -> li
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
     told: list[Told] = []
 
-    def tell(most: int, prints: int) -> Told:
-        told.append(Told(most, prints, seed))
+    def tell(most: int, prints: int, seats: Sequence[Polygon]) -> Told:
+        told.append(Told(most, prints, seats, seed))
         return told[-1]
 
     with patch("tms_agents.floor.estimator.Association", tell):
@@ -125,8 +126,8 @@ def choices(job: tuple[str, int, Any, str], duration: float | None = None) -> li
 class Told(Association):
     """Is told whose feet are whose; ``people`` and ``owners`` are the truth about the next scan."""
 
-    def __init__(self, most: int, prints: int, seed: int) -> None:
-        super().__init__(most, prints)
+    def __init__(self, most: int, prints: int, seats: Sequence[Polygon], seed: int) -> None:
+        super().__init__(most, prints, seats)
         self._seed = seed
         self._tracks: dict[int, int] = {}
         self.people: dict[int, tuple[float, float]] = {}
@@ -156,7 +157,7 @@ class Told(Association):
                     self._note(clusters[i], cost[i], rows, columns[i] // 2, t - age)
         free = np.ones(count, np.bool_)
         adopt(self.bodies, rows, columns, clusters, of, marks, free, BLANK, prints, t, sight)
-        complete(self.bodies, rows, clusters, of, marks, free, BLANK, prints, t, sight)
+        complete(self.bodies, rows, clusters, of, marks, free, BLANK, prints, t, sight, self.seats)
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return ~free
 

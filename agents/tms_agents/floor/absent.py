@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
-from tms_agents.floor.state import BODY, empty, pack, unpack
+from tms_agents.floor.state import BODY, CONCEALED, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Absent:
         somebody = body["hits"] >= _SOMEBODY and not body["robot"] and body["wide"] < 0.3
         if somebody:
             lost.append(body.copy())
-            lost[-1]["stale"] = 1
+            lost[-1]["stale"] = CONCEALED
         return bool(somebody)
 
     def save(self) -> dict[str, Any]:

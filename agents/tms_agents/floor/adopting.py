@@ -157,10 +157,11 @@ def complete(
     prints: Any,
     t: float,
     sight: Any,
+    seats: Any,
 ) -> float:
     """What the movers that are ``believed`` (k,) have left goes to those who are not yet, and then begins new ones.
 
-    The negative log likelihood of not having seen those in view.
+    The negative log likelihood of not having seen those in view; ``seats`` as `missed` takes them.
     """
     m = clusters.size
     scratch = np.empty(bodies.size, np.int64)
@@ -189,7 +190,7 @@ def complete(
                 if _pushed(c, bodies, t):
                     bodies[b].from_furniture = 1
                 break
-    unseen = missed(bodies, believed, t, sight)
+    unseen = missed(bodies, believed, t, sight, seats)
     expect(bodies, t, sight)
     return float(unseen)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from tms_agents.floor.build import agree
 from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.likelihood import feet
+from tms_agents.floor.masks import joined
 from tms_agents.floor.nobodys import goes_on, known, nobodys
+from tms_agents.floor.settings import Polygon
 from tms_agents.floor.shine import expected, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
 
@@ -50,6 +53,7 @@ def _advance(
     prints: Any,
     t: float,
     sight: Any,
+    seats: Any,
     taken: NDArray[np.bool_],
     nobodys_at: Array,
     spare_nobodys_at: Array,
@@ -109,7 +113,8 @@ def _advance(
         for i in range(m):
             if free[i] and of[i] >= 0:
                 spare_nobodys_at[kept, of[i]] = t
-        score = child_score[o] - least + complete(bodies, rows[:k], clusters, of, marks, free, blank, prints, t, sight)
+        score = child_score[o] - least
+        score += complete(bodies, rows[:k], clusters, of, marks, free, blank, prints, t, sight, seats)
         known_already = False
         for j in range(kept):
             if same_places(spare[j], bodies, other_of):
@@ -198,9 +203,13 @@ def _propose(
 
 
 class Association:
-    """The hypotheses about who is where; the best is ``bodies`` (``most``,) of `state.BODY`; so many ``prints``."""
+    """The hypotheses about who is where; the best is ``bodies`` (``most``,) of `state.BODY`; so many ``prints``.
 
-    def __init__(self, most: int, prints: int) -> None:
+    On ``seats`` people lift their feet.
+    """
+
+    def __init__(self, most: int, prints: int, seats: Sequence[Polygon] = ()) -> None:
+        self.seats = joined(seats)
         self._hypotheses, self._spare = empty(BODY, (_KEPT, most)), empty(BODY, (_KEPT, most))
         self._pool = empty(BODY, _POOL)
         # All fields are as long as an integer: what is the same to the last bit is found by these.
@@ -237,6 +246,7 @@ class Association:
             prints,
             t,
             sight,
+            self.seats,
             taken,
             self._nobodys_at,
             self._spare_nobodys_at,

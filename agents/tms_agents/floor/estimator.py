@@ -66,7 +66,7 @@ class FloorEstimator:
         self._masks = Masks(self._scene.region, self._scene.masks, self._scene.gates)
         self._gates = Area(self._scene.gates)
         self._prints = empty(PRINT, _PRINTS)
-        self._association = Association(_BODIES, _PRINTS)
+        self._association = Association(_BODIES, _PRINTS, self._scene.seats)
         self._shoes = legs()
         self._tracks = Tracks(self._association, self._settings, self._scene)
         self._objects = Objects(empty(THING, _THINGS), self._settings)

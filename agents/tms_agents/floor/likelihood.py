@@ -23,12 +23,15 @@ from tms_agents.floor.build import (
 from tms_agents.floor.landing import landing
 from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
+from tms_agents.floor.state import SEATED
 
 Array = NDArray[np.float64]
 
 UNLIKELY = 1e6
 #: Feet are so far from the body along its way and aside (m); nobody's foot is farther away than this.
 _ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
+#: Who has sat down gets up with a foot so near (m) one of his.
+_RISES_M = 0.9
 #: Time for which a new print counts as a fresh step (s).
 FRESH_S = 1.0
 #: Two feet side by side are hardly wider (m).
@@ -184,6 +187,8 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
     if body.stale and age > FRESH_S and not waits(body, c):
         return
     if print_ >= 0 and lay_before(q, body):
+        return
+    if body.stale == SEATED and _strides(body, c) > _RISES_M:
         return
     if not body.confirmed and print_ >= 0 and q.rested < body.first - 0.25:
         return

@@ -99,6 +99,23 @@ class Area:
         within = (polygon for polygon in self.polygons if inside(polygon, x, y))
         return max((float(border(polygon, x, y)) for polygon in within), default=0.0)
 
+    def into(self, x: float, y: float, deep: float) -> tuple[float, float]:
+        """Where one is who has gone from (x, y) straight across the nearest edge of a polygon, so deep (m) if it is.
+
+        ``(x, y)`` itself in a polygon, and where there is none.
+        """
+        start = np.array([x, y])
+        if not np.inf > self.distance(x, y) > 0.0:
+            return x, y
+        polygon = min(self.polygons, key=lambda one: float(distance(one, x, y)))
+        sides = np.roll(polygon, -1, axis=0) - polygon
+        share = ((start - polygon) * sides).sum(axis=1) / np.maximum((sides * sides).sum(axis=1), 1e-12)
+        ways = polygon + sides * share.clip(0.0, 1.0)[:, None] - start
+        way = ways[np.hypot(*ways.T).argmin()]
+        there = start + way * (1.0 + deep / max(float(np.hypot(*way)), 1e-9))
+        x, y = there if inside(polygon, there[0], there[1]) else start + way
+        return float(x), float(y)
+
 
 class Masks:
     """Which clusters count."""
@@ -109,7 +126,7 @@ class Masks:
     def __init__(self, region: Polygon | None, masks: Sequence[Polygon], gates: Sequence[Polygon] = ()) -> None:
         self._region = np.zeros((0, 2)) if region is None else np.asarray(region, dtype=float)
         # Who comes in is met in the door.
-        self._gates, self._masks = _joined(gates), _joined(masks)
+        self._gates, self._masks = joined(gates), joined(masks)
         self._any = region is not None or bool(masks)
 
     def __call__(self, clusters: Any) -> Any:
@@ -123,7 +140,7 @@ class Masks:
         return self._region.size > 0 and not inside(self._region, x, y)
 
 
-def _joined(polygons: Sequence[Polygon]) -> tuple[Array, NDArray[np.int64]]:
-    """Their corners (n, 2), one after the other, and how many each has."""
+def joined(polygons: Sequence[Polygon]) -> tuple[Array, NDArray[np.int64]]:
+    """The corners (n, 2) of all ``polygons``, one after the other, and how many each has: what kernels take."""
     corners = [np.zeros((0, 2)), *(np.asarray(polygon, dtype=float) for polygon in polygons)]
     return np.concatenate(corners), np.array([len(polygon) for polygon in polygons], dtype=np.int64)

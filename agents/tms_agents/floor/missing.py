@@ -9,9 +9,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, beam_of, clear
+from tms_agents.floor.masks import distance
 
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
+#: The same of who is so near (m) a seat that he may just have sat down and lifted his feet.
+_SITS, _NEAR_M = 0.3, 0.5
 #: And of missing one leg of somebody who walks (m/s) for so long (s), seen so often, in this share on both legs.
 _LIMP, _WALKS, _UP_S, _SEEN, _MOSTLY = 0.8, 0.4, 0.6, 20, 0.6
 
@@ -20,21 +23,38 @@ _AHEAD_M, _LEAVES, _SWINGS_S = 0.3, 0.5, 0.6
 
 
 @njit(cache=True)
-def missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any) -> float:
-    """Negative log likelihood of not having seen those movers ``rows`` (k,), or a leg of theirs, that were in view."""
+def missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any, seats: Any) -> float:
+    """Negative log likelihood of not having seen those movers ``rows`` (k,), or a leg of theirs, that were in view.
+
+    Less near ``seats``, as `masks.joined` gives them.
+    """
     ranges, states, longest, pose, first, step = sight
     total = 0.0
     for b in rows:
         body = bodies[b]
         waits = body.seen < t and not body.stale and t - body.seen < 1.0
         if waits and clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
-            total += _MISS
+            total += _SITS if _may_sit(body, seats) else _MISS
         elif body.seen == t and _limps(body, t):
             x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
             x, y = 2.0 * body.x - x, 2.0 * body.y - y
             if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
                 total += _LIMP
     return total
+
+
+@njit(cache=True)
+def _may_sit(body: Any, seats: Any) -> bool:
+    """Whether the body, or the foot seen last, was so near a seat that the feet may have been lifted."""
+    corners, sizes = seats
+    x, y = (body.ax, body.ay) if body.a_seen > body.b_seen else (body.bx, body.by)
+    start = 0
+    for m in range(sizes.size):
+        seat = corners[start : start + sizes[m]]
+        if min(distance(seat, body.x, body.y), distance(seat, x, y)) < _NEAR_M:
+            return True
+        start += sizes[m]
+    return False
 
 
 @njit(cache=True)

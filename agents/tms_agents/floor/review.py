@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.bodies import misled
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
+from tms_agents.floor.masks import distance
 from tms_agents.floor.prints import ALONE
 
 Array = NDArray[np.float64]
@@ -318,6 +319,18 @@ def unseen(bodies: Any, since: float, rows: NDArray[np.int64]) -> int:
     for b in range(bodies.size):
         body = bodies[b]
         if body.used and body.confirmed and not body.stale and body.seen < since:
+            rows[count] = b
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def outside(bodies: Any, t: float, region: Array, far: float, rows: NDArray[np.int64]) -> int:
+    """Fill ``rows`` (n,) with the movers seen at t ``far`` (m) out of the ``region`` (k, 2): how many there are."""
+    count = 0
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and body.confirmed and body.seen == t and distance(region, body.x, body.y) > far:
             rows[count] = b
             count += 1
     return count

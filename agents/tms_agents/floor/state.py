@@ -57,6 +57,9 @@ PRINT = np.dtype(
     ]
 )
 
+#: Of a body that is not seen (stale): it is hidden, or it has sat down.
+CONCEALED, SEATED = 1, 2
+
 #: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began, and
 #: two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
 #: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt

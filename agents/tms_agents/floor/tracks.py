@@ -23,10 +23,12 @@ from tms_agents.floor.review import (
     doubled,
     has_walked,
     is_footless,
+    outside,
     review,
     unseen,
 )
 from tms_agents.floor.settings import FloorSettings, Scene
+from tms_agents.floor.state import CONCEALED, SEATED
 
 #: How much what is seen next of somebody lost must look like feet.
 _DOUBTED = 0.5
@@ -50,6 +52,11 @@ _OUT_M, _SPEED = 0.5, 0.9
 _THROUGH_S = 0.6
 #: Who is so near (m) is in a door. Of a way out of the room so many places are looked at.
 _DOOR_M, _SAMPLES = 0.3, 9
+#: Who is seen so far (m) out of it has left the room; who is no farther comes in.
+_OUTSIDE_M, _INSIDE_M = 0.1, 0.05
+#: Who would be so near (m) a seat as he went sits on it, this far (m) from its edge: for certain, if his feet have
+#: vanished in clear view for so long (s).
+_INTO_M, _DEEP_M, _CLEAR_S = 0.2, 0.25, 0.3
 #: A foot that leaves lands so far away (m) within so long (s).
 _STRIDE_M, _STEPS_S = 1.2, 0.6
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
@@ -104,7 +111,7 @@ class Tracks:
         self._see_off(t)
         self._believe_steps(t)
         self._association.rename(t)
-        events: list[FloorEvent] = self.absent.gone(t) + self._unite(t)
+        events: list[FloorEvent] = self.absent.gone(t) + self._unite(t) + self._gone_out(t)
         for index, action in enumerate(self._actions.tolist()):
             if action == NOTHING:
                 continue
@@ -171,6 +178,18 @@ class Tracks:
             if self._through(body) and body["seen"] - body["rest_at"] < _RESTS_S:
                 self._actions[index] = GONE
 
+    def _gone_out(self, t: float) -> list[FloorEvent]:
+        """Who is seen to have gone out by a door has left: whoever comes in by it next is somebody new."""
+        events: list[FloorEvent] = []
+        for region in self._region.polygons:
+            for index in self._rows[: outside(self.bodies, t, region, _OUTSIDE_M, self._rows)].tolist():
+                body = self.bodies[index]
+                if self._leaves(body):
+                    self._association.forget(index)
+                    self._actions[index] = NOTHING
+                    events.append(Vanished(t, int(body["label"]), t, t))
+        return events
+
     def _unite(self, t: float) -> list[FloorEvent]:
         """Two movers with one foot each at one place are one: the younger label goes."""
         events: list[FloorEvent] = []
@@ -185,11 +204,14 @@ class Tracks:
         body = self.bodies[index]
         if body["stale"]:
             return []
+        seated = self._sits(body)
         walled = bool(self._region.polygons) and self._region.distance(float(body["x"]), float(body["y"])) > 0.0
-        if self._seated(body) or (walled and not self._leaves(body)):
+        if seated or (walled and not self._leaves(body)):
             # Who has sat down, or would have gone through a wall, has not gone on the way he went.
             foot = "a" if body["a_seen"] > body["b_seen"] else "b"
             body["x"], body["y"] = body[f"{foot}x"], body[f"{foot}y"]
+            if seated:
+                body["x"], body["y"] = self._seats.into(float(body["x"]), float(body["y"]), _DEEP_M)
         elif body["seen"] - body["rest_at"] < _RESTS_S and self._leaves(body):
             self._association.forget(index)
             left = not self.absent.turns(body)
@@ -201,12 +223,20 @@ class Tracks:
             body["a_seen"] = body["b_seen"] = -1e9
             body["lone"] = body["wide"] = 0.0
             body["quality"] = max(body["quality"], _DOUBTED)
-        body["stale"] = 1
+        body["stale"] = CONCEALED
+        if seated and body["clear"] > _CLEAR_S:
+            self._association.decide(index)
+            body["stale"] = SEATED
         body["vx"] = body["vy"] = 0.0
         return [Stale(t, int(body["label"]))]
 
     def _seated(self, body: Any) -> bool:
-        return self._nearest(self._seats, body) < _SEAT_M
+        return body["stale"] == SEATED or self._nearest(self._seats, body) < _SEAT_M
+
+    def _sits(self, body: Any) -> bool:
+        """Whether somebody whose feet are seen no more has sat down: beside a seat, or on his way into one."""
+        into = self._seats.distance(float(body["x"]), float(body["y"])) < _INTO_M
+        return not body["robot"] and (into or self._seated(body))
 
     def _masked(self, body: Any) -> bool:
         return min(self._nearest(self._masks, body), self._masks.distance(body["x"], body["y"])) < _MASK_M
@@ -234,6 +264,8 @@ class Tracks:
         self, index: int, t: float, new_label: Callable[[], int], was_furniture: Callable[[Any], bool]
     ) -> list[FloorEvent]:
         body = self.bodies[index]
+        if self._region.polygons and self._region.distance(float(body["x"]), float(body["y"])) > _INSIDE_M:
+            return []
         if body["from_furniture"] == 1 and (body["wide"] > 0.3 or body["width"] > _PIECE_M):
             # Nothing is pushed so far; it goes by itself.
             way = math.hypot(body["x"] - body["x0"], body["y"] - body["y0"])

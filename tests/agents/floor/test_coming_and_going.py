@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from floor_rooms import Room, sweep
 from floor_rooms import walker as legs_of
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorSettings, Scene, Sensor, Vanished
 from tms_agents.floor.association import Association
@@ -15,7 +17,8 @@ from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
 from tms_agents.floor.events import Back, Stale
 from tms_agents.floor.freespace import vacant
-from tms_agents.floor.masks import Masks
+from tms_agents.floor.likelihood import UNLIKELY, feet
+from tms_agents.floor.masks import Area, Masks, joined
 from tms_agents.floor.missing import missed
 from tms_agents.floor.nobodys import costs
 from tms_agents.floor.review import CONFIRM, GONE, NOTHING, review
@@ -63,6 +66,70 @@ def test_who_walks_out_of_the_door_has_left_before_a_second_is_over(
     walker(one.bodies[0], 4.9, y, (1.0, 0.0), NOW - 0.7)
     events = at(one, NOW)
     assert [type(event) for event in events] == ([Vanished] if left else [])
+
+
+def coming(body: np.ndarray, x: float, since: float) -> None:
+    """Somebody new who comes in at x (m) by the door, and has been seen walking there ``since``."""
+    walker(body, x, 1.5, (-1.0, 0.0), NOW)
+    body["confirmed"], body["label"], body["first"], body["x0"], body["y0"] = 0, -1, since, x + 0.8, 1.5
+    body["hits"], body["looks"], body["due"], body["both"], body["score"] = 20, 20, 20, 15, 20.0
+    body["a_since"] = body["b_since"] = NOW - 0.2
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "gone"), [(5.15, 1.5, True), (5.05, 1.5, False), (5.15, 3.0, False)], ids=["out", "in", "a wall"]
+)
+def test_who_is_seen_outside_the_door_has_left(x: float, y: float, gone: bool) -> None:
+    one = tracks([DOOR], ROOM)
+    walker(one.bodies[0], x, y, (1.0, 0.0), NOW)
+    events = at(one, NOW)
+    assert [type(event) for event in events] == ([Vanished] if gone else [])
+    assert len(one.labels(NOW)) == (0 if gone else 1)
+
+
+@pytest.mark.parametrize(("x", "told"), [(5.1, []), (4.9, [Appeared])], ids=["still outside", "inside"])
+def test_who_comes_by_the_door_is_told_when_inside(x: float, told: list[type]) -> None:
+    one = tracks([DOOR], ROOM)
+    coming(one.bodies[0], x, NOW - 1.0)
+    assert [type(event) for event in at(one, NOW)] == told
+
+
+SEAT = [(3.0, 2.5), (5.0, 2.5), (5.0, 3.5), (3.0, 3.5)]
+
+
+def sits(clear: float, x: float = 4.0, y: float = 2.2) -> Tracks:
+    """Somebody whose feet, last seen at (x, y), have vanished for ``clear`` s in view; somebody else beside him."""
+    one = Tracks(Association(2, 1, [SEAT]), FloorSettings(), Scene(region=ROOM, gates=[DOOR], seats=[SEAT]))
+    walker(one.bodies[0], x, y, (0.0, 0.0), NOW - 1.1)
+    one.bodies["clear"][0] = clear
+    assert [type(event) for event in at(one, NOW)] == [Stale]
+    return one
+
+
+def test_who_sits_down_is_told_on_the_seat_not_before_it() -> None:
+    (label,) = sits(0.8).labels(NOW)
+    assert label.stale and label.xy == pytest.approx((4.0, 2.75))
+
+
+@pytest.mark.parametrize(("clear", "away", "may"), [(0.8, 0.6, True), (0.8, 1.1, False), (0.0, 1.1, True)])
+def test_who_has_sat_down_in_clear_view_gets_up_beside_the_seat(clear: float, away: float, may: bool) -> None:
+    """A foot of somebody who passes is not his; who was hidden may have gone on."""
+    one = sits(clear)
+    one.bodies["pp"] = 0.25
+    clusters, prints, cost = np.zeros(1, CLUSTER), empty(PRINT, 1), np.zeros((1, 2))
+    clusters["x"], clusters["y"], clusters["n"], clusters["width"] = 4.0, 2.1 - away, 8, 0.1
+    clusters["spacing"] = 0.01
+    feet(clusters, np.zeros(1, np.int64) - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, one.bodies, 0, NOW, cost)
+    assert (cost.min() < UNLIKELY) == may
+
+
+@given(x=st.floats(-2.0, 8.0), y=st.floats(-2.0, 6.0), deep=st.floats(0.0, 0.4))
+def test_across_the_edge_of_an_area_one_is_in_it_or_on_its_edge(x: float, y: float, deep: float) -> None:
+    area = Area([SEAT])
+    there = area.into(x, y, deep)
+    assert area.distance(*there) == pytest.approx(0.0, abs=1e-6)
+    assert area.distance(x, y) > 0.0 or there == (x, y)
+    assert math.dist((x, y), there) <= area.distance(x, y) + deep + 1e-6
 
 
 def behind(low: float, high: float, away: float) -> tuple:
@@ -168,7 +235,16 @@ def test_a_walker_of_whom_one_leg_is_missing_is_a_worse_explanation(change: dict
     bodies["b_seen"] = NOW - 0.7
     for name, value in change.items():
         bodies[name] = value
-    assert missed(bodies, rows, NOW, OPEN) == pytest.approx(price)
+    assert missed(bodies, rows, NOW, OPEN, joined([])) == pytest.approx(price)
+
+
+@pytest.mark.parametrize(("away", "price"), [(0.3, 0.3), (0.8, 2.0)])
+def test_feet_that_vanish_beside_a_seat_may_have_been_lifted(away: float, price: float) -> None:
+    """Else he takes a foot of whoever is near rather than sit down."""
+    bodies, rows = empty(BODY, 1), np.zeros(1, np.int64)
+    walker(bodies[0], 3.0 - away, 0.0, (0.0, 0.0), NOW - 0.5)
+    seat = [(3.0, -1.0), (4.0, -1.0), (4.0, 1.0), (3.0, 1.0)]
+    assert missed(bodies, rows, NOW, OPEN, joined([seat])) == pytest.approx(price)
 
 
 def test_a_leg_behind_somebody_is_not_missed() -> None:
@@ -176,7 +252,7 @@ def test_a_leg_behind_somebody_is_not_missed() -> None:
     walker(bodies[0], 3.0, 0.0, (1.0, 0.0), NOW)
     bodies["b_seen"] = NOW - 0.7
     before = (np.full(101, 2.0), np.full(101, FOREGROUND, np.int8), *OPEN[2:])
-    assert missed(bodies, rows, NOW, before) == 0.0
+    assert missed(bodies, rows, NOW, before, joined([])) == 0.0
 
 
 @pytest.mark.parametrize(("width", "far", "cheap"), [(0.1, 0.7, False), (0.4, 0.7, True), (0.1, 0.2, True)])
