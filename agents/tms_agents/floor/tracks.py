@@ -52,7 +52,7 @@ _OUT_M, _SPEED = 0.5, 0.9
 _THROUGH_S = 0.6
 #: Who is so near (m) is in a door. Of a way out of the room so many places are looked at.
 _DOOR_M, _SAMPLES = 0.3, 9
-#: Who is seen so far (m) out of it has left the room; who is no farther comes in.
+#: Who is seen so far (m) outside the region has left the room; who comes is told when he is no farther (m) from it.
 _OUTSIDE_M, _INSIDE_M = 0.1, 0.05
 #: Who would be so near (m) a seat as he went sits on it, this far (m) from its edge: for certain, if his feet have
 #: vanished in clear view for so long (s).
@@ -228,7 +228,8 @@ class Tracks:
             self._association.decide(index)
             body["stale"] = SEATED
         body["vx"] = body["vy"] = 0.0
-        return [Stale(t, int(body["label"]))]
+        moved: list[FloorEvent] = [Moved(t, *self._tell(index, t))] if seated else []
+        return [*moved, Stale(t, int(body["label"]))]
 
     def _seated(self, body: Any) -> bool:
         return body["stale"] == SEATED or self._nearest(self._seats, body) < _SEAT_M

@@ -15,7 +15,7 @@ from tms_agents.floor import Appeared, FloorEstimator, FloorSettings, Scene, Sen
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
-from tms_agents.floor.events import Back, Stale
+from tms_agents.floor.events import Back, Moved, Stale
 from tms_agents.floor.freespace import vacant
 from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.masks import Area, Masks, joined
@@ -102,7 +102,9 @@ def sits(clear: float, x: float = 4.0, y: float = 2.2) -> Tracks:
     one = Tracks(Association(2, 1, [SEAT]), FloorSettings(), Scene(region=ROOM, gates=[DOOR], seats=[SEAT]))
     walker(one.bodies[0], x, y, (0.0, 0.0), NOW - 1.1)
     one.bodies["clear"][0] = clear
-    assert [type(event) for event in at(one, NOW)] == [Stale]
+    moved, lost = at(one, NOW)
+    assert isinstance(moved, Moved) and isinstance(lost, Stale)
+    assert moved.xy == one.labels(NOW)[0].xy
     return one
 
 
