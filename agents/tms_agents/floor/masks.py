@@ -38,15 +38,24 @@ def distance(polygon: Array, x: float, y: float) -> float:
 @njit(cache=True)
 def border(polygon: Array, x: float, y: float) -> float:
     """How far (x, y) is from the outline of the polygon (n, 2), m."""
+    edge_x, edge_y = edge(polygon, x, y)
+    return float(np.hypot(edge_x - x, edge_y - y))
+
+
+@njit(cache=True)
+def edge(polygon: Array, x: float, y: float) -> tuple[float, float]:
+    """The place on the outline of the polygon (n, 2) that is nearest to (x, y), m."""
     n = polygon.shape[0]
-    best = np.inf
+    best, edge_x, edge_y = np.inf, np.inf, np.inf
     for i in range(n):
         ax, ay = polygon[i, 0], polygon[i, 1]
         dx, dy = polygon[(i + 1) % n, 0] - ax, polygon[(i + 1) % n, 1] - ay
         share = ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)
         share = min(1.0, max(0.0, share))
-        best = min(best, np.hypot(ax + share * dx - x, ay + share * dy - y))
-    return best
+        away = np.hypot(ax + share * dx - x, ay + share * dy - y)
+        if away < best:
+            best, edge_x, edge_y = away, ax + share * dx, ay + share * dy
+    return edge_x, edge_y
 
 
 @njit(cache=True)
@@ -104,17 +113,13 @@ class Area:
 
         ``(x, y)`` itself in a polygon, and where there is none.
         """
-        start = np.array([x, y])
-        if not np.inf > self.distance(x, y) > 0.0:
+        away = self.distance(x, y)
+        if not np.inf > away > 0.0:
             return x, y
         polygon = min(self.polygons, key=lambda one: float(distance(one, x, y)))
-        sides = np.roll(polygon, -1, axis=0) - polygon
-        share = ((start - polygon) * sides).sum(axis=1) / np.maximum((sides * sides).sum(axis=1), 1e-12)
-        ways = polygon + sides * share.clip(0.0, 1.0)[:, None] - start
-        way = ways[np.hypot(*ways.T).argmin()]
-        there = start + way * (1.0 + deep / max(float(np.hypot(*way)), 1e-9))
-        x, y = there if inside(polygon, there[0], there[1]) else start + way
-        return float(x), float(y)
+        edge_x, edge_y = edge(polygon, x, y)
+        there = float(edge_x + (edge_x - x) * deep / away), float(edge_y + (edge_y - y) * deep / away)
+        return there if inside(polygon, *there) else (float(edge_x), float(edge_y))
 
 
 class Masks:

@@ -77,10 +77,14 @@ def coming(body: np.ndarray, x: float, since: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "gone"), [(5.15, 1.5, True), (5.05, 1.5, False), (5.15, 3.0, False)], ids=["out", "in", "a wall"]
+    ("x", "y", "gates", "gone"),
+    [(5.15, 1.5, [DOOR], True), (5.05, 1.5, [DOOR], False), (5.15, 3.0, [DOOR], False), (5.15, 3.0, [], True)],
+    ids=["out", "in", "a wall", "no doors known"],
 )
-def test_who_is_seen_outside_the_door_has_left(x: float, y: float, gone: bool) -> None:
-    one = tracks([DOOR], ROOM)
+def test_who_is_seen_outside_the_door_has_left(
+    x: float, y: float, gates: list[list[tuple[float, float]]], gone: bool
+) -> None:
+    one = tracks(gates, ROOM)
     walker(one.bodies[0], x, y, (1.0, 0.0), NOW)
     events = at(one, NOW)
     assert [type(event) for event in events] == ([Vanished] if gone else [])
@@ -97,10 +101,10 @@ def test_who_comes_by_the_door_is_told_when_inside(x: float, told: list[type]) -
 SEAT = [(3.0, 2.5), (5.0, 2.5), (5.0, 3.5), (3.0, 3.5)]
 
 
-def sits(clear: float, x: float = 4.0, y: float = 2.2) -> Tracks:
-    """Somebody whose feet, last seen at (x, y), have vanished for ``clear`` s in view; somebody else beside him."""
+def sits(clear: float) -> Tracks:
+    """Somebody whose feet, last seen 0.3 m before the seat, have vanished, ``clear`` s of that in view."""
     one = Tracks(Association(2, 1, [SEAT]), FloorSettings(), Scene(region=ROOM, gates=[DOOR], seats=[SEAT]))
-    walker(one.bodies[0], x, y, (0.0, 0.0), NOW - 1.1)
+    walker(one.bodies[0], 4.0, 2.2, (0.0, 0.0), NOW - 1.1)
     one.bodies["clear"][0] = clear
     moved, lost = at(one, NOW)
     assert isinstance(moved, Moved) and isinstance(lost, Stale)
