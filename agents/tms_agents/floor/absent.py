@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
+from tms_agents.floor.patience import has_left
 from tms_agents.floor.state import BODY, CONCEALED, empty, pack, unpack
 
 Array = NDArray[np.float64]
@@ -100,9 +101,12 @@ class Absent:
                 best, best_cost = index, cost
         return None if best is None else lost.pop(best)
 
-    def stands(self, print_: Any) -> bool:
-        """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost."""
-        return any(
+    def stands(self, print_: Any, bodies: Any) -> bool:
+        """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost.
+
+        Not if it was taken for a foot of one of the ``bodies`` (n,), who has left it.
+        """
+        return not has_left(print_, bodies) and any(
             print_["rested"] > one["seen"] - _JUST_S
             and math.hypot(print_["x"] - one["x"], print_["y"] - one["y"]) < _STEPS_M
             for one in self._bodies

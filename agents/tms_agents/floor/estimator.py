@@ -198,7 +198,7 @@ class FloorEstimator:
         edge = q["width"] < _EDGE_M or q["whole"] < 0.8 * q["hits"]
         sliver = (q["attached"] > 0.02 and edge) or (q["beams"] < 2.0 and not q["given"])
         unsettled = sliver and started < self._settings.learn_s + _UNSETTLED_S
-        if unsettled or (not q["given"] and self._tracks.absent.stands(q)):
+        if unsettled or (not q["given"] and self._tracks.absent.stands(q, self._tracks.bodies)):
             return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from tms_agents.floor.bodies import WIDE_M, narrow
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
 from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
+from tms_agents.floor.prints import thin
 from tms_agents.floor.segmentation import BRIDGE
 
 Array = NDArray[np.float64]
 
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
-#: somebody new known already, and what has rested there as nobody's.
-_NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS = 11.0, 6.0, 4.0, 5.0, 2.0
+#: somebody new known already, and what has rested there as nobody's, the same too thin for a foot.
+_NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS, _THIN = 11.0, 6.0, 4.0, 5.0, 2.0, 0.4
 #: A shoe that was nobody's just before (within s): less than somebody new, who is paid for once.
 _GOES_ON, _BEFORE_S = 5.0, 0.35
 #: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
@@ -76,7 +77,7 @@ def nobodys(
                 part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
                 stands = stands or part
             if not stands:
-                cost[i, i] = _RESTS
+                cost[i, i] = _THIN if thin(prints[of[i]]) else _RESTS
         if _part(clusters, i, longest):
             cost[i, i] = min(cost[i, i], _PART)
 

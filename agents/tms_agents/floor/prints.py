@@ -37,10 +37,11 @@ _MUTE_S = 3.0
 _STILL_M, _STILL = 0.008, 0.001
 #: Somebody is at a print when the body or a foot is so near (m).
 NEAR_M = 0.36
-#: Seen so often, a shoe is not so thin (m), a leg not so much thinner or wider than it was.
-_OFTEN, _SHOE_M, _LEG = 10, 0.07, (0.65, 1.6)
-#: What is so far (m) beside a robot that has rested for so long (s) is no part of it.
-_CLEAR_M, _PARKED_S = 0.06, 3.0
+#: Seen so often, a foot is not so thin (m), a leg not so much thinner or wider than it was.
+_OFTEN, _THIN_M, _LEG = 10, 0.07, (0.65, 1.6)
+#: What is so far (m) beside a robot that has rested for so long (s) is no part of it, nor is what has lain still while
+#: it drove for so long (s).
+_CLEAR_M, _PARKED_S, _DRIVES_S = 0.06, 3.0, 1.0
 #: What alone has been seen of somebody for so long (s), and is no more as bright as his feet, is none.
 _ALONE_S = 60.0
 #: A shoe that looks narrower (m) than from its side cannot hide the other one for so long (s).
@@ -205,13 +206,23 @@ def lay_before(q: Any, body: Any) -> bool:
 
 
 @njit(cache=True)
+def thin(q: Any) -> bool:
+    """Whether the print, seen whole, is too thin for a shoe and for most legs."""
+    return bool(_whole(q) and q.width < _THIN_M)
+
+
+@njit(cache=True)
 def unlike_foot(body: Any, q: Any) -> bool:
     """Whether the print, seen whole, is too thin for a shoe, or as wide as no leg of the body."""
-    if q.hits < _OFTEN or q.whole < 0.5 * q.hits:
-        return False
     if body.shoe >= SHOES:
-        return bool(q.width < _SHOE_M)
-    return bool(body.leg > 0.0 and not _LEG[0] < q.width / body.leg < _LEG[1])
+        return thin(q)
+    return bool(_whole(q) and body.leg > 0.0 and not _LEG[0] < q.width / body.leg < _LEG[1])
+
+
+@njit(cache=True)
+def _whole(q: Any) -> bool:
+    """Whether all of the print has been seen often."""
+    return bool(q.hits >= _OFTEN and q.whole >= 0.5 * q.hits)
 
 
 @njit(cache=True)
@@ -279,7 +290,8 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
             if body.stale:
                 continue
             d = np.hypot(body.x - q.x, body.y - q.y)
-            if body.machine and t - body.rest_at > _PARKED_S and d > 0.5 * (body.far + q.width) + _CLEAR_M:
+            parked = t - body.rest_at > _PARKED_S and d > 0.5 * (body.far + q.width) + _CLEAR_M
+            if body.machine and (parked or body.rest_at - q.first > _DRIVES_S):
                 continue
             reach = NEAR_M + (0.3 if body.robot else 0.0)
             if t - body.a_seen < 0.6 and body.a_print != j:

@@ -128,4 +128,16 @@ def test_what_came_where_somebody_was_lost_may_be_his_foot(
     absent.keep(person(4.0, 4.0))
     (print_,) = empty(PRINT, 1)
     print_["x"], print_["y"], print_["rested"] = 4.0 + away, 4.0, since
-    assert absent.stands(print_) == stands
+    assert absent.stands(print_, empty(BODY, 1)) == stands
+
+
+@pytest.mark.parametrize(("whose", "both_seen", "may_stand"), [(5, True, False), (6, True, True), (5, False, True)])
+def test_what_somebody_else_stood_on_and_has_left_is_no_foot_of_who_was_lost(
+    absent: Absent, whose: int, both_seen: bool, may_stand: bool
+) -> None:
+    absent.keep(person(4.0, 4.0))
+    bodies, print_ = empty(BODY, 1), empty(PRINT, 1)[0]
+    bodies[0] = person(5.5, 4.0, label=5, seen=14.0)
+    bodies["a_seen"], bodies["b_seen"] = 14.0, 14.0 if both_seen else 12.0
+    print_["x"], print_["y"], print_["rested"], print_["whose"] = 4.2, 4.0, 12.0, whose
+    assert absent.stands(print_, bodies) == may_stand

@@ -10,8 +10,9 @@ from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, FloorSettings, Scene
 from tms_agents.floor.likelihood import UNLIKELY, too_wide
-from tms_agents.floor.nobodys import costs, known
+from tms_agents.floor.nobodys import costs, known, nobodys
 from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.prints import attend
 from tms_agents.floor.putting import count_feet
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
@@ -151,6 +152,30 @@ def test_no_shoe_is_longer_than_any(length: float, dearer: float) -> None:
     body["shoe"], body["own_sole"], body["own_sole_n"] = 1.0, 0.27, 50
     cluster["width"] = length
     assert too_wide(body, cluster) == dearer
+
+
+@pytest.mark.parametrize(("drove_s", "busy"), [(2.0, False), (0.5, True), (-1.0, True)])
+def test_what_lies_still_while_a_robot_drives_past_is_no_part_of_it(drove_s: float, busy: bool) -> None:
+    """The robot has been at rest for two seconds, and drove until so long after the print was there first."""
+    prints, bodies = resting(2.0 + drove_s), empty(BODY, 1)
+    bodies["used"] = bodies["confirmed"] = bodies["robot"] = bodies["machine"] = 1
+    bodies["a_print"] = bodies["b_print"] = -1
+    bodies["x"], bodies["far"], bodies["rest_at"] = prints["x"] + 0.5, 0.5, prints["first"] + drove_s
+    attend(prints, bodies, NOW, 0.1, expected(), np.zeros(2))
+    assert bool(prints["busy"][0] == NOW) == busy
+
+
+def test_what_is_too_thin_for_a_foot_costs_less_to_be_nobodys() -> None:
+    one, cost = np.zeros(1, np.int64), np.zeros((3, 1, 1))
+    clusters = np.zeros(1, CLUSTER)
+    clusters["n"], clusters["spacing"], clusters["mirror"] = 8, 0.01, -1
+    shapes: list[dict[str, float]] = [{"width": 0.1}, {"width": 0.06}, {"width": 0.06, "whole": 3}]
+    for each, shape in zip(cost, shapes, strict=True):
+        clusters["width"] = shape["width"]
+        nobodys(clusters, one, resting(3.0, **shape), empty(BODY, 1), one[:0], NOW, each)
+    wide, thin, in_part = cost[:, 0, 0]
+    assert thin < wide - 1.0
+    assert in_part == wide
 
 
 @pytest.mark.parametrize(("pushed", "price"), [(1, 5.0), (0, 11.0)])
