@@ -150,7 +150,7 @@ class Told(Association):
             for column, row in enumerate(rows):
                 others = [i for i, owner in enumerate(owners) if owner < 0 or owner != self._tracks.get(int(row))]
                 right[others, 2 * column : 2 * column + 2] = UNLIKELY
-            assign(right, columns)
+            assign(right, 2 * rows.size, UNLIKELY, columns)
             for i in np.flatnonzero(columns < 2 * rows.size):
                 age = t - prints[of[i]]["first"] if of[i] >= 0 else 0.0
                 if age < _FRESH_S:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, together, update
-from tms_agents.floor.likelihood import too_wide
+from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.missing import expect, missed, out_of_reach
 from tms_agents.floor.nobodys import costs
+from tms_agents.floor.norm import norm
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import learn
 
@@ -172,7 +173,7 @@ def complete(
         if m:
             cost = np.empty((m, 2 * k + m))
             costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
-            assign(cost, columns)
+            assign(cost, 2 * k, UNLIKELY, columns)
         adopt(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
     for i in range(m):
         c = clusters[i]
@@ -211,10 +212,10 @@ def _crowded(c: Any, bodies: Any) -> bool:
     """Whether somebody's foot is so near that this is hardly another body."""
     for b in range(bodies.size):
         body = bodies[b]
-        if body.used and min(np.hypot(body.ax - c.x, body.ay - c.y), np.hypot(body.bx - c.x, body.by - c.y)) < 0.22:
+        if body.used and min(norm(body.ax - c.x, body.ay - c.y), norm(body.bx - c.x, body.by - c.y)) < 0.22:
             return True
         # Legs that are one thing to the laser fall apart now and then.
-        if body.used and body.confirmed and np.hypot(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
+        if body.used and body.confirmed and norm(body.x - c.x, body.y - c.y) < 0.12 + 0.5 * body.width:
             return True
     return False
 
@@ -225,7 +226,7 @@ def _pushed(c: Any, bodies: Any, t: float) -> bool:
     for b in range(bodies.size):
         body = bodies[b]
         person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
-        near = person and np.hypot(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
+        near = person and norm(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
         if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
             return True
     return False

@@ -2,64 +2,89 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 #: Of a column that no row has.
 _NOBODY = -1
 
 
-@njit(cache=True)
-def assign(cost: Array, of_row: NDArray[np.int64]) -> float:
-    """Fill ``of_row`` (m,) with the column of each row of ``cost`` (m, n), m <= n, at the least sum: that sum."""
-    m, n = cost.shape
-    return float(solve(cost, of_row, np.empty(n, np.int64), np.empty(m), np.empty(n)))
+class Work(NamedTuple):
+    """What `solve` leaves for `reassign`, of a table of m rows and n columns at most: `work` makes it.
 
-
-@njit(cache=True)
-def solve(cost: Array, of_row: NDArray[np.int64], of_column: NDArray[np.int64], u: Array, v: Array) -> float:
-    """As `assign`; also the row of each column (n,), or `_NOBODY`, and what each row (m,) and column costs by itself.
-
-    Shortest augmenting paths (Jonker and Volgenant 1987; Crouse 2016).
+    columns (m, n) that each row may have, so many (counts (m,)); of_column (n,) the row of each column, or `_NOBODY`;
+    u (m,), v (n,) what each row and column costs by itself. Of a search: from which row (path (n,)) and how far
+    (shortest (n,)) the columns are that it has met, and which it has reached: of none between searches.
     """
+
+    columns: Integers
+    counts: Integers
+    of_column: Integers
+    u: Array
+    v: Array
+    path: Integers
+    shortest: Array
+    met: Integers
+    reached: NDArray[np.bool_]
+
+
+@njit(cache=True)
+def work(m: int, n: int) -> Work:
+    """For tables of m rows and n columns at most."""
+    columns, counts, of_column = np.empty((m, n), np.int64), np.empty(m, np.int64), np.empty(n, np.int64)
+    path, met = np.empty(n, np.int64), np.empty(n, np.int64)
+    shortest, reached = np.full(n, np.inf), np.zeros(n, np.bool_)
+    return Work(columns, counts, of_column, np.empty(m), np.empty(n), path, shortest, met, reached)
+
+
+@njit(cache=True)
+def assign(cost: Array, shared: int, most: float, of_row: Integers) -> float:
+    """Fill ``of_row`` (m,) with the column of each row of ``cost`` (m, n), m <= n, at the least sum: that sum.
+
+    Of the first ``shared`` columns each row may have those in which it costs less than ``most``, and of the others, if
+    there are any, its own: the first is that of the first row. There must be a solution.
+    """
+    return float(solve(cost, shared, most, of_row, work(cost.shape[0], cost.shape[1])))
+
+
+@njit(cache=True)
+def solve(cost: Array, shared: int, most: float, of_row: Integers, w: Work) -> float:
+    """As `assign`: shortest augmenting paths (Jonker and Volgenant 1987; Crouse 2016)."""
     m, n = cost.shape
-    u[:], v[:], of_row[:], of_column[:] = 0.0, 0.0, -1, _NOBODY
-    path = np.full(n, -1)
-    shortest = np.empty(n)
-    in_rows, in_columns = np.empty(m, np.bool_), np.empty(n, np.bool_)
+    _allow(cost, shared, most, w)
+    u, v, of_column, path, shortest, met, reached = w.u, w.v, w.of_column, w.path, w.shortest, w.met, w.reached
+    u[:m], v[:n], of_row[:], of_column[:n] = 0.0, 0.0, -1, _NOBODY
     for start in range(m):
-        shortest[:] = np.inf
-        in_rows[:] = False
-        in_columns[:] = False
-        least, i, sink = 0.0, start, -1
+        best, lowest = _cheapest(cost, w, start, -1)
+        if of_column[best] < 0:
+            # Most rows get what they would like best.
+            u[start], of_row[start], of_column[best] = lowest, best, start
+            continue
+        least, i, sink, many = 0.0, start, -1, 0
         while sink < 0:
-            in_rows[i] = True
-            best, lowest = -1, np.inf
-            for j in range(n):
-                if in_columns[j]:
-                    continue
-                reduced = least + cost[i, j] - u[i] - v[j]
-                if reduced < shortest[j]:
-                    path[j] = i
-                    shortest[j] = reduced
-                if shortest[j] < lowest or (shortest[j] == lowest and of_column[j] < 0):
-                    best, lowest = j, shortest[j]
-            least = lowest
+            for o in range(w.counts[i]):
+                j = w.columns[i, o]
+                many = _approach(j, i, least + cost[i, j] - u[i] - v[j], w, many)
+            best, least = _nearest(w, many, True)
+            reached[best] = True
             if of_column[best] < 0:
                 sink = best
             else:
                 i = of_column[best]
-            in_columns[best] = True
         u[start] += least
-        for i in range(m):
-            if in_rows[i] and i != start:
-                u[i] += least - shortest[of_row[i]]
-        for j in range(n):
-            if in_columns[j]:
+        for o in range(many):
+            j = met[o]
+            if reached[j]:
+                if of_column[j] >= 0:
+                    u[of_column[j]] += least - shortest[j]
                 v[j] -= least - shortest[j]
+        _forget(w, many)
         j = sink
         while True:
             i = path[j]
@@ -71,49 +96,43 @@ def solve(cost: Array, of_row: NDArray[np.int64], of_column: NDArray[np.int64], 
 
 
 @njit(cache=True)
-def reassign(
-    cost: Array,
-    of_row: NDArray[np.int64],
-    of_column: NDArray[np.int64],
-    u: Array,
-    v: Array,
-    row: int,
-    barred: int,
-    most: float,
-    other: NDArray[np.int64],
-) -> float:
+def reassign(cost: Array, of_row: Integers, row: int, barred: int, most: float, other: Integers, w: Work) -> float:
     """Fill ``other`` (m,) with the best assignment in which ``row`` has none of the columns ``barred`` and the next.
 
     Of what `solve` gave only one row must find another place: one shortest path to the column that it had, as if there
     were rows to which every column is free of charge, and one of them had each column that nobody has. Its sum, or
     infinity where that costs more than ``most`` more.
     """
-    n = cost.shape[1]
+    of_column, u, v, path = w.of_column, w.u, w.v, w.path
     freed = of_row[row]
-    path = np.full(n, _NOBODY)
-    shortest = np.full(n, np.inf)
-    reached = np.zeros(n, np.bool_)
-    least, i, idle = 0.0, row, -1
-    while not reached[freed]:
-        best, lowest = -1, np.inf
-        for j in range(n):
-            if reached[j]:
-                continue
-            if i != row or not barred <= j <= barred + 1:
-                reduced = least - v[j] if i == _NOBODY else least + cost[i, j] - u[i] - v[j]
-                if reduced < shortest[j]:
-                    path[j] = i
-                    shortest[j] = reduced
-            if shortest[j] < lowest:
-                best, lowest = j, shortest[j]
-        if lowest > most:
-            return np.inf
-        least = lowest
-        reached[best] = True
-        i = of_column[best]
-        if i == _NOBODY and idle < 0:
-            idle = best
+    best, lowest = _cheapest(cost, w, row, barred)
+    if lowest - u[row] > most:
+        return np.inf
     other[:] = of_row
+    if of_column[best] < 0 and v[freed] == 0.0:
+        other[row] = best
+        return _total(cost, other)
+    least, i, best, idle, many = 0.0, row, -1, -1, 0
+    while best != freed and least <= most:
+        if i != _NOBODY:
+            for o in range(w.counts[i]):
+                j = w.columns[i, o]
+                if i != row or not barred <= j <= barred + 1:
+                    many = _approach(j, i, least + cost[i, j] - u[i] - v[j], w, many)
+        elif idle < 0:
+            idle = best
+            if v[freed] == 0.0:
+                # Nothing is nearer.
+                path[freed] = _NOBODY
+                break
+            for j in range(cost.shape[1]):
+                many = _approach(j, _NOBODY, least - v[j], w, many)
+        best, least = _nearest(w, many, False)
+        w.reached[best] = True
+        i = of_column[best]
+    _forget(w, many)
+    if least > most:
+        return np.inf
     j = freed
     while True:
         i = path[j]
@@ -127,7 +146,76 @@ def reassign(
 
 
 @njit(cache=True)
-def _total(cost: Array, of_row: NDArray[np.int64]) -> float:
+def _allow(cost: Array, shared: int, most: float, w: Work) -> None:
+    """Note which columns each row may have."""
+    m, n = cost.shape
+    for i in range(m):
+        count = 0
+        for j in range(shared):
+            if cost[i, j] < most:
+                w.columns[i, count] = j
+                count += 1
+        if shared + i < n:
+            w.columns[i, count] = shared + i
+            count += 1
+        w.counts[i] = count
+
+
+@njit(cache=True, inline="always")
+def _cheapest(cost: Array, w: Work, i: int, barred: int) -> tuple[int, float]:
+    """The column that row i would like best, neither of the two that are ``barred`` (-1: none), and what it costs."""
+    best, lowest = -1, np.inf
+    for o in range(w.counts[i]):
+        j = w.columns[i, o]
+        if barred < 0 or not barred <= j <= barred + 1:
+            reduced = cost[i, j] - w.v[j]
+            if reduced < lowest or (reduced == lowest and _goes_first(j, best, w.of_column, barred < 0)):
+                best, lowest = j, reduced
+    return best, lowest
+
+
+@njit(cache=True, inline="always")
+def _goes_first(j: int, other: int, of_column: Integers, idle: bool) -> bool:
+    """Which of two columns that are equally near is the next: the first, or the last that is ``idle``, if wanted."""
+    if idle and (of_column[j] < 0 or of_column[other] < 0):
+        return bool(of_column[j] < 0 and (j > other or of_column[other] >= 0))
+    return j < other
+
+
+@njit(cache=True, inline="always")
+def _approach(j: int, i: int, length: float, w: Work, many: int) -> int:
+    """The column j may be reached from row i on a path so long: how many columns have been met."""
+    if not w.reached[j] and length < w.shortest[j]:
+        if w.shortest[j] == np.inf:
+            w.met[many] = j
+            many += 1
+        w.path[j] = i
+        w.shortest[j] = length
+    return many
+
+
+@njit(cache=True, inline="always")
+def _nearest(w: Work, many: int, idle: bool) -> tuple[int, float]:
+    """The nearest column that is not reached, and how long the path to it is."""
+    best, lowest = -1, np.inf
+    for o in range(many):
+        j = w.met[o]
+        length = w.shortest[j]
+        nearer = length < lowest or (length == lowest and _goes_first(j, best, w.of_column, idle))
+        if nearer and not w.reached[j]:
+            best, lowest = j, length
+    return best, lowest
+
+
+@njit(cache=True)
+def _forget(w: Work, many: int) -> None:
+    """The search is over."""
+    for o in range(many):
+        w.shortest[w.met[o]], w.reached[w.met[o]] = np.inf, False
+
+
+@njit(cache=True)
+def _total(cost: Array, of_row: Integers) -> float:
     total = 0.0
     for i in range(of_row.size):
         total += cost[i, of_row[i]]

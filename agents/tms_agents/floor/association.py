@@ -10,14 +10,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.adopting import BLANK, adopt_from, chosen, complete
-from tms_agents.floor.assignment import reassign, solve
+from tms_agents.floor.assignment import reassign, solve, work
 from tms_agents.floor.bodies import begin, predict
 from tms_agents.floor.build import agree
 from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
-from tms_agents.floor.likelihood import feet
+from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.masks import joined
-from tms_agents.floor.nobodys import goes_on, known, nobodys
+from tms_agents.floor.nobodys import goes_on, known, nobodys, spanned
 from tms_agents.floor.settings import Polygon
 from tms_agents.floor.shine import expected, scatter
 from tms_agents.floor.state import BODY, empty, pack, unpack
@@ -72,8 +72,9 @@ def _advance(
         predict(hypotheses[h], t)
         for b in range(n):
             if hypotheses[h, b].used:
-                first[h, b] = first_like(raw, ALL, h, b)
-                alike[h, b] = first_like(raw, FEET, h, b)
+                g = first_like(raw, ALL, h, b)
+                first[h, b] = g
+                alike[h, b] = alike[g, b] if g < h else first_like(raw, FEET, h, b)
     children = _propose(
         hypotheses, alike, scores, clusters, of, marks, prints, t, nobodys_at, child_score, child_parent, child_columns
     )
@@ -168,7 +169,10 @@ def _propose(
         k = chosen(hypotheses[h], 1, rows)
         top = max(top, rows[k - 1] + 1 if k else 0)
     told = np.empty((count, top, m, 2))
-    children = 0
+    table, solved = np.empty(m * (2 * top + m)), work(m, 2 * top + m)
+    spans = np.empty(m)
+    spanned(clusters, spans)
+    children, least = 0, np.inf
     for h in range(count):
         bodies = hypotheses[h]
         k = chosen(bodies, 1, rows)
@@ -176,26 +180,28 @@ def _propose(
             child_score[children], child_parent[children] = scores[h], h
             children += 1
             continue
-        cost = np.empty((m, 2 * k + m))
+        cost = table[: m * (2 * k + m)].reshape(m, 2 * k + m)
         for column in range(k):
             row = rows[column]
             like = alike[h, row]
             if like == h:
                 feet(clusters, of, marks, everything, prints, bodies, row, t, told[h, row])
             cost[:, 2 * column : 2 * column + 2] = told[like, row]
-        nobodys(clusters, of, prints, bodies, rows[:k], t, cost[:, 2 * k :])
+        nobodys(clusters, of, prints, bodies, rows[:k], spans, t, cost[:, 2 * k :])
         known(clusters, bodies, t, cost[:, 2 * k :])
         goes_on(clusters, of, prints, bodies, rows[:k], nobodys_at[h], t, cost[:, 2 * k :])
-        of_column, u, v = np.empty(2 * k + m, np.int64), np.empty(m), np.empty(2 * k + m)
-        best = solve(cost, columns, of_column, u, v)
+        best = solve(cost, 2 * k, UNLIKELY, columns, solved)
         child_score[children], child_parent[children] = scores[h] + best, h
+        least = min(least, scores[h] + best)
+        # What is worse is given up anyway.
+        most = min(_BRANCH, least + _WORSE - scores[h] - best)
         child_columns[children] = columns
         children += 1
         for i in range(m):
             if columns[i] >= 2 * k:
                 continue
-            total = reassign(cost, columns, of_column, u, v, i, columns[i] // 2 * 2, 1.01 * _BRANCH, other)
-            if total - best < _BRANCH:
+            total = reassign(cost, columns, i, columns[i] // 2 * 2, 1.01 * most, other, solved)
+            if total - best < most:
                 child_score[children], child_parent[children] = scores[h] + total, h
                 child_columns[children] = other
                 children += 1

@@ -9,6 +9,7 @@ from numba import njit
 
 from tms_agents.floor.build import size_up, wears_shoes
 from tms_agents.floor.gait import foot, middle, swap
+from tms_agents.floor.norm import norm
 from tms_agents.floor.segmentation import FADES
 
 #: Acceleration noise (m²/s³) and how fast the memory of a velocity fades while nothing is seen (s).
@@ -76,11 +77,11 @@ def together(body: Any, clusters: Any, i: int, t: float) -> bool:
     ):
         return False
     reach = 0.5 * c.width + 0.05
-    if np.hypot(c.x - body.ax, c.y - body.ay) > reach or np.hypot(c.x - body.bx, c.y - body.by) > reach:
+    if norm(c.x - body.ax, c.y - body.ay) > reach or norm(c.x - body.bx, c.y - body.by) > reach:
         return False
     for o in range(clusters.size):
         p = clusters[o]
-        near = min(np.hypot(p.x - body.ax, p.y - body.ay), np.hypot(p.x - body.bx, p.y - body.by))
+        near = min(norm(p.x - body.ax, p.y - body.ay), norm(p.x - body.bx, p.y - body.by))
         if o != i and near < STAND_M:
             return False
     return True
@@ -155,13 +156,13 @@ def update(
     t: float,
 ) -> None:
     """The body was seen: its first foot is the cluster c, its second d, each where there is one; or ``one`` is both."""
-    if has_c and has_d and np.hypot(c.x - d.x, c.y - d.y) > LONGEST_M:
+    if has_c and has_d and norm(c.x - d.x, c.y - d.y) > LONGEST_M:
         # No step is so long: the foot that stood for longer is something else.
         if prints[c_print].first < prints[d_print].first:
             has_c = False
         else:
             has_d = False
-    speed = np.hypot(body.vx, body.vy)
+    speed = norm(body.vx, body.vy)
     if has_c:
         if c_print != body.a_print and speed > 0.35 and t - body.b_seen < 0.4:
             _stride(body, c.x - body.bx, c.y - body.by, speed, 1.0)
@@ -214,7 +215,7 @@ def update(
     if slow < np.inf:
         _measure(body, vx - body.vx, vy - body.vy, 0.0, 1.0, slow)
     # Nobody runs here: a jump is a wrong foot, not a speed.
-    speed = np.hypot(body.vx, body.vy)
+    speed = norm(body.vx, body.vy)
     if speed > _FAST:
         body.vx *= _FAST / speed
         body.vy *= _FAST / speed

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.norm import norm
+
 #: Of such a share of wide feet somebody's shoes are seen, not legs; so wide (m) is a shoe from its side.
 SHOES, _SHOE_M = 0.3, (0.16, 0.34)
 #: No shoe is so long (m).
@@ -69,7 +71,7 @@ def size_up(body: Any, c: Any) -> None:
     if c.cut != 0:
         return
     body.shoe += 0.04 * ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - body.shoe)
-    speed = np.hypot(body.vx, body.vy)
+    speed = norm(body.vx, body.vy)
     if speed < WALKS:
         return
     body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
@@ -99,7 +101,7 @@ def from_side(c: Any) -> bool:
 @njit(cache=True)
 def astray(body: Any, c: Any) -> float:
     """The sine of the angle between the way the body goes and the way the cluster points, if it is a shoe."""
-    return float(abs(body.vx * c.ey - body.vy * c.ex) / max(np.hypot(body.vx, body.vy), 1e-6))
+    return float(abs(body.vx * c.ey - body.vy * c.ex) / max(norm(body.vx, body.vy), 1e-6))
 
 
 @njit(cache=True)
@@ -122,7 +124,7 @@ def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, sho
     """
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or body.seen < t or np.hypot(body.vx, body.vy) < WALKS:
+        if not body.used or not body.confirmed or body.robot or body.seen < t or norm(body.vx, body.vy) < WALKS:
             continue
         for i in range(clusters.size):
             c = clusters[i]

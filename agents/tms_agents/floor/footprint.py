@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.norm import norm
 from tms_agents.floor.outline import ALL, HIDDEN, ON, fit, quality, share_of
 
 Array = NDArray[np.float64]
@@ -68,11 +69,11 @@ def follow(
     if dt > 0.0:
         q.vx += _GAIN * (q.x - x) / dt
         q.vy += _GAIN * (q.y - y) / dt
-        speed = math.hypot(q.vx, q.vy)
+        speed = norm(q.vx, q.vy)
         if speed > _FAST:
             q.vx, q.vy = _FAST * q.vx / speed, _FAST * q.vy / speed
     q.seen = t
-    q.going = math.hypot(q.vx, q.vy) > _GOES
+    q.going = norm(q.vx, q.vy) > _GOES
     q.hits += 1
     q.fits += _LATELY * (value - q.fits)
     if q.hits == _BEGUN:
@@ -89,20 +90,20 @@ def accompany(q: Any, bodies: Any, t: float, dt: float) -> None:
     for b in range(bodies.size):
         body = bodies[b]
         person = body.used and body.confirmed and not body.robot and body.wide < _WIDE and t - body.seen < _LATE_S
-        beside = beside or (person and math.hypot(body.x - q.x, body.y - q.y) < _PUSHES_M + q.a)
+        beside = beside or (person and norm(body.x - q.x, body.y - q.y) < _PUSHES_M + q.a)
     q.pushed += _BESIDE * ((1.0 if beside else 0.0) - q.pushed)
-    q.alone = 0.0 if beside else q.alone + dt * math.hypot(q.vx, q.vy)
+    q.alone = 0.0 if beside else q.alone + dt * norm(q.vx, q.vy)
 
 
 @njit(cache=True)
 def take(q: Any, clusters: Any, ranges: Array, rays: Array, pose: Array, claimed: NDArray[np.bool_], at: Array) -> int:
     """Take what is on the outline out of ``clusters`` (m,), and claim its beams: how many are left."""
     at[0], at[1], at[2] = q.x, q.y, q.yaw
-    reach = math.hypot(q.a, q.b) + _PART_M
+    reach = norm(q.a, q.b) + _PART_M
     kept = 0
     for k in range(clusters.size):
         c = clusters[k]
-        near = c.mirror < 0 and math.hypot(c.x - q.x, c.y - q.y) < reach
+        near = c.mirror < 0 and norm(c.x - q.x, c.y - q.y) < reach
         if near and share_of(c, at, q.a, q.b, ranges, rays, pose) >= _ITS:
             claimed[c.first : c.last + 1] = True
             continue
@@ -125,6 +126,6 @@ def drive(hypotheses: Any, index: int, q: Any, t: float) -> None:
         body.machine, body.robot, body.from_furniture = 1, 1, -1
         body.wide, body.quality = 1.0, 1.0
         body.clear, body.lone, body.single, body.pushed = 0.0, 0.0, 0.0, 0.0
-        body.width, body.far = 2.0 * q.a, 2.0 * math.hypot(q.a, q.b)
+        body.width, body.far = 2.0 * q.a, 2.0 * norm(q.a, q.b)
         body.hits += 1
         body.score += 1.0

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
@@ -87,7 +88,7 @@ def middle_of(ranges: Array, rays: Array, o: int, a: int, b: int, x: float, y: f
             if abs(three - one) > _SLANT * width:
                 ax, ay = rays[a, o] + ranges[a] * rays[a, o + 2], rays[a, o + 1] + ranges[a] * rays[a, o + 3]
                 bx, by = rays[b, o] + ranges[b] * rays[b, o + 2], rays[b, o + 1] + ranges[b] * rays[b, o + 3]
-                length = max(np.hypot(bx - ax, by - ay), 1e-6)
+                length = max(norm(bx - ax, by - ay), 1e-6)
                 nx, ny = (ay - by) / length, (bx - ax) / length
                 if nx * dx + ny * dy < 0.0:
                     nx, ny = -nx, -ny
@@ -148,7 +149,7 @@ def look(
         for v in range(views.shape[0]):
             vx = views[v, 0] * thing.x + views[v, 1] * thing.y + views[v, 4]
             vy = views[v, 2] * thing.x + views[v, 3] * thing.y + views[v, 5]
-            away = np.hypot(vx - pose[0], vy - pose[1])
+            away = norm(vx - pose[0], vy - pose[1])
             middle = beam_of(np.arctan2(vy - pose[1], vx - pose[0]) - pose[2], first, step, n)
             if np.isnan(middle) or away < 0.05:
                 continue
@@ -267,7 +268,7 @@ def _nearer(ranges: Array, states: NDArray[np.int8], low: int, high: int, before
 @njit(cache=True)
 def _towards(x: float, y: float, half: float, pose: Array, first: float, step: float, n: int) -> tuple[float, int, int]:
     """How far (x, y) is, m, and the first and last of the n beams that meet it ± half m (0 and -1: none)."""
-    away = np.hypot(x - pose[0], y - pose[1])
+    away = norm(x - pose[0], y - pose[1])
     middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
     if np.isnan(middle):
         return away, 0, -1
@@ -366,7 +367,7 @@ def clear(
     FREE, HIDDEN behind something new, WALLED behind the background, else UNSEEN (out of view or reach).
     """
     n = ranges.size
-    away = np.hypot(x - pose[0], y - pose[1])
+    away = norm(x - pose[0], y - pose[1])
     middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
     if np.isnan(middle):
         return UNSEEN

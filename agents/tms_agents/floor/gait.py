@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from tms_agents.floor.build import SHOES, beat, from_side
+from tms_agents.floor.norm import norm
 
 #: A foot that moved by so much (m) since the last scan swings; a stance elsewhere than the last (m) is another one.
 _SWING_M, _STANCE_M = 0.05, 0.12
@@ -56,7 +57,7 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
     body.a_vx, body.a_vy = 0.0, 0.0
     swings = False
     if 0.0 < dt < 0.3:
-        moved = np.hypot(c.x - body.ax, c.y - body.ay)
+        moved = norm(c.x - body.ax, c.y - body.ay)
         if moved > _SWING_M:
             took = max(dt + late - body.a_late, 0.5 * dt)
             body.a_vx, body.a_vy = (c.x - body.ax) / took, (c.y - body.ay) / took
@@ -71,7 +72,7 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
     elsewhere = _STANCE_M
     if body.shoe >= SHOES:
         elsewhere = _ROLL_M if t - body.a_stood > _UP_S else _ROLLS_M
-    anew = np.hypot(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0
+    anew = norm(c.x - body.a_px, c.y - body.a_py) > elsewhere or t - body.a_stood > 2.0
     if anew and not stays:
         beat(body, body.a_stood - body.a_land, since - body.a_stood)
         body.a_ox, body.a_oy = body.a_px, body.a_py
@@ -132,7 +133,7 @@ def _astride(body: Any, t: float) -> tuple[float, float, float, float, float, fl
         noise = 0.08 + 0.2 * age
         vx, vy, slow = _going(body, dx, dy, qx - ox, qy - oy, t)
         return qx + share * dx, qy + share * dy, noise * noise, vx, vy, slow
-    if shoes and np.hypot(dx, dy) > _ASTRIDE_M:
+    if shoes and norm(dx, dy) > _ASTRIDE_M:
         return qx, qy, 0.15**2, 0.0, 0.0, np.inf
     noise = max(0.05, 0.17 - 0.1 * (age - 0.3))
     share = -0.3 if shoes and age < 0.45 else -0.5
@@ -142,7 +143,7 @@ def _astride(body: Any, t: float) -> tuple[float, float, float, float, float, fl
 @njit(cache=True)
 def _going(body: Any, dx: float, dy: float, ox: float, oy: float, t: float) -> tuple[float, float, float]:
     """Velocity (m/s) and its variance by the step (dx, dy) to the other foot and the stride (ox, oy) of this one."""
-    if np.hypot(ox, oy) > 1.8:
+    if norm(ox, oy) > 1.8:
         return 1.4 * dx, 1.4 * dy, 0.5**2
     vx, vy = 0.83 * dx + 0.3 * ox, 0.83 * dy + 0.3 * oy
     if body.e_at == t:
@@ -173,11 +174,11 @@ def _alone(body: Any, t: float) -> tuple[float, float, float, float, float, floa
     """The first foot stands, the other is not seen: lifted (above the plane) or hidden."""
     age, gone = t - body.a_land, t - body.b_stood
     dx, dy = body.a_px - body.b_px, body.a_py - body.b_py
-    if gone > 1.5 or np.hypot(dx, dy) > 1.2:
+    if gone > 1.5 or norm(dx, dy) > 1.2:
         # Both legs may be one thing to the laser: it goes as the body goes.
         return body.ax, body.ay, 0.1**2, 0.0, 0.0, np.inf
     if body.a_land < body.b_land:
-        if body.shoe >= SHOES and np.hypot(dx, dy) > _BEHIND_M and age > _LONG_S:
+        if body.shoe >= SHOES and norm(dx, dy) > _BEHIND_M and age > _LONG_S:
             return body.x, body.y, np.inf, 0.0, 0.0, np.inf
         # The other had landed later and is up again: this one may be a foot that waits.
         back = 0.12 if body.shoe >= SHOES else 0.3

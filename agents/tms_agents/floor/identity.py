@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.build import LEGS_KNOWN, SHOES, SHOES_KNOWN
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -128,7 +129,7 @@ def christen(bodies: Any, belief: Array, index: int, x: float, y: float) -> None
         one = bodies[b]
         if b == index or not one.used or not one.confirmed or one.robot:
             continue
-        if min(np.hypot(one.x - x, one.y - y), np.hypot(one.x - here.x0, one.y - here.y0)) < _BESIDE_M:
+        if min(norm(one.x - x, one.y - y), norm(one.x - here.x0, one.y - here.y0)) < _BESIDE_M:
             belief[index, b], belief[b, index] = _CONFUSED, _CONFUSED * belief[b, b]
 
 
@@ -154,7 +155,7 @@ def renamed(bodies: Any, belief: Array, t: float, scattered: Array, names: NDArr
             total += np.exp(-cost[i, j])
         bodies[rows[i]].sure = np.exp(-cost[i, i]) / total
     best = np.empty(n, np.int64)
-    assign(cost, best)
+    assign(cost, n, np.inf, best)
     changed = False
     done = np.zeros(n, np.bool_)
     for i in range(n):

@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.norm import norm
+
 Array = NDArray[np.float64]
 
 #: Log likelihood by how long (s) the shoe was not seen: who is seen standing on it has not put it down elsewhere.
@@ -42,7 +44,7 @@ def landing(body: Any, c: Any, ox: float, oy: float, seen: float, other: float, 
 
     The shoe was last ``seen`` (s); the ``other`` one, at (ox, oy) m, has landed at that time (s).
     """
-    speed = np.hypot(body.vx, body.vy)
+    speed = norm(body.vx, body.vy)
     ux, uy = (body.vx / speed, body.vy / speed) if speed > 0.05 else (1.0, 0.0)
     ago = body.at - since
     x, y = c.x - body.x + ago * body.vx, c.y - body.y + ago * body.vy

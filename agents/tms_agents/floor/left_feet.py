@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import begin
+from tms_agents.floor.norm import norm
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import strangeness
 
@@ -41,7 +42,7 @@ def _left(q: Any, body: Any, t: float) -> bool:
         and q.owned - q.rested > _STOOD_S
         and _JUST_S < ago < _LATELY_S
         and q.idle < ago + _STRAYED_S
-        and np.hypot(q.x - body.x, q.y - body.y) > _GONE_M
+        and norm(q.x - body.x, q.y - body.y) > _GONE_M
     )
 
 
@@ -64,7 +65,7 @@ def _other(body: Any, prints: Any, i: int, t: float) -> int:
     p = prints[i]
     for j in range(prints.size):
         q = prints[j]
-        apart = np.hypot(p.x - q.x, p.y - q.y)
+        apart = norm(p.x - q.x, p.y - q.y)
         if j != i and _left(q, body, t) and abs(p.owned - q.owned) < _TOGETHER_S and _FEET_M[0] < apart < _FEET_M[1]:
             return j
     return -1

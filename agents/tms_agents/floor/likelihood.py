@@ -21,6 +21,7 @@ from tms_agents.floor.build import (
     wears_shoes,
 )
 from tms_agents.floor.landing import landing
+from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
 from tms_agents.floor.state import SEATED
@@ -81,7 +82,7 @@ def _strides_on(dx: float, dy: float, body: Any, speed: float, side: float) -> f
 @njit(cache=True)
 def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float, dt: float) -> float:
     """The same of a foot that has moved by (dx, dy) in dt s: it goes straight on (u, v m/s), or begins to swing."""
-    pace = np.hypot(u, v)
+    pace = norm(u, v)
     if pace > 0.4:
         along, aside = (dx * u + dy * v) / pace, (dy * u - dx * v) / pace
         over = max(-along, along - pace * dt - 2.5 * dt, 0.0)
@@ -93,7 +94,7 @@ def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float,
         along = min(max(dx * ux + dy * uy, 0.0), reach)
         dx, dy = dx - along * ux, dy - along * uy
     else:
-        away = np.hypot(dx, dy)
+        away = norm(dx, dy)
         share = max(away - reach, 0.0) / max(away, 1e-6)
         dx, dy = dx * share, dy * share
     return float(0.5 * (dx * dx + dy * dy) / 0.1**2 + 2.5)
@@ -125,7 +126,7 @@ def _another_shoe(body: Any, c: Any) -> float:
     value = 0.0
     if body.own_sole_n >= SHOES_KNOWN:
         value += 0.5 * min(((sole(c) - body.own_sole) / _SOLE_M) ** 2, _OTHER)
-    if np.hypot(body.vx, body.vy) > WALKS:
+    if norm(body.vx, body.vy) > WALKS:
         value += 0.5 * min((astray(body, c) / _TURNED) ** 2, _OTHER)
     return value
 
@@ -135,14 +136,14 @@ def waits(body: Any, c: Any) -> bool:
     """Whether the cluster is where a foot of the body stood when it was lost sight of."""
     if not body.stale or body.robot or max(body.a_seen, body.b_seen) < 0.0:
         return False
-    a = body.a_seen >= 0.0 and np.hypot(c.x - body.ax, c.y - body.ay) < STAND_M
-    return bool(a or (body.b_seen >= 0.0 and np.hypot(c.x - body.bx, c.y - body.by) < STAND_M))
+    a = body.a_seen >= 0.0 and norm(c.x - body.ax, c.y - body.ay) < STAND_M
+    return bool(a or (body.b_seen >= 0.0 and norm(c.x - body.bx, c.y - body.by) < STAND_M))
 
 
 @njit(cache=True)
 def _strides(body: Any, c: Any) -> float:
     """How far (m) the nearer foot of the body would have to step to the cluster."""
-    return float(min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by)))
+    return float(min(norm(c.x - body.ax, c.y - body.ay), norm(c.x - body.bx, c.y - body.by)))
 
 
 @njit(cache=True)
@@ -179,7 +180,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
     if body.footprint:
         # What is its own is known (`footprints`).
         return
-    away = np.hypot(c.x - body.x, c.y - body.y)
+    away = norm(c.x - body.x, c.y - body.y)
     if away > _REACH_M + 1.5 * np.sqrt(body.pp):
         return
     q = prints[print_] if print_ >= 0 else prints[0]
@@ -205,7 +206,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         cost[0] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > least else 6.0)
         return
     lately = print_ >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
-    speed = np.hypot(body.vx, body.vy)
+    speed = norm(body.vx, body.vy)
     base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
     shape = unlike(body, marks)
     if c.width > WIDE_M:
@@ -225,12 +226,12 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
     for which in range(2):
         if which == 0:
             x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
-            ox, oy, other, swings = body.bx, body.by, body.b_seen, np.hypot(body.b_vx, body.b_vy)
+            ox, oy, other, swings = body.bx, body.by, body.b_seen, norm(body.b_vx, body.b_vy)
             landed, beside = body.b_land, body.b_print
             left = t - body.a_since > _LEFT_S and t - body.b_since < FRESH_S
         else:
             x, y, u, v, seen, standing = body.bx, body.by, body.b_vx, body.b_vy, body.b_seen, body.b_print
-            ox, oy, other, swings = body.ax, body.ay, body.a_seen, np.hypot(body.a_vx, body.a_vy)
+            ox, oy, other, swings = body.ax, body.ay, body.a_seen, norm(body.a_vx, body.a_vy)
             landed, beside = body.a_land, body.a_print
             left = t - body.b_since > _LEFT_S and t - body.a_since < FRESH_S
         gap = t - seen
@@ -248,7 +249,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
             if swings > 0.5 and t - other < 0.22:
                 swing += _BOTH
             value = min(value, swing)
-        if broad > 0.0 and t - other < 0.2 and np.hypot(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
+        if broad > 0.0 and t - other < 0.2 and norm(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
             value += broad
         step = anywhere
         if body.shoe >= SHOES:

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.norm import norm
 from tms_agents.floor.settings import Polygon
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ def distance(polygon: Array, x: float, y: float) -> float:
 def border(polygon: Array, x: float, y: float) -> float:
     """How far (x, y) is from the outline of the polygon (n, 2), m."""
     edge_x, edge_y = edge(polygon, x, y)
-    return float(np.hypot(edge_x - x, edge_y - y))
+    return float(norm(edge_x - x, edge_y - y))
 
 
 @njit(cache=True)
@@ -52,7 +53,7 @@ def edge(polygon: Array, x: float, y: float) -> tuple[float, float]:
         dx, dy = polygon[(i + 1) % n, 0] - ax, polygon[(i + 1) % n, 1] - ay
         share = ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)
         share = min(1.0, max(0.0, share))
-        away = np.hypot(ax + share * dx - x, ay + share * dy - y)
+        away = norm(ax + share * dx - x, ay + share * dy - y)
         if away < best:
             best, edge_x, edge_y = away, ax + share * dx, ay + share * dy
     return edge_x, edge_y

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, beam_of, clear
 from tms_agents.floor.masks import distance
+from tms_agents.floor.norm import norm
 
 #: Negative log likelihood of missing somebody in clear view in one scan.
 _MISS = 2.0
@@ -79,7 +80,7 @@ def out_of_reach(body: Any, c: Any, t: float, sight: Any) -> bool:
 
     Then where his other foot is tells, not that he waits for it.
     """
-    speed = np.hypot(body.vx, body.vy)
+    speed = norm(body.vx, body.vy)
     if body.robot or speed < _LEAVES or t - min(body.a_seen, body.b_seen) > _SWINGS_S:
         return False
     if (c.x - body.x) * body.vx + (c.y - body.y) * body.vy > 0.0:
@@ -93,6 +94,6 @@ def out_of_reach(body: Any, c: Any, t: float, sight: Any) -> bool:
 @njit(cache=True)
 def _limps(body: Any, t: float) -> bool:
     """Whether somebody walks of whom both legs are seen mostly (a shoe is up half of the time), and now one is not."""
-    if body.robot or body.wide > 0.3 or np.hypot(body.vx, body.vy) < _WALKS:
+    if body.robot or body.wide > 0.3 or norm(body.vx, body.vy) < _WALKS:
         return False
     return bool(body.hits > _SEEN and body.both > _MOSTLY * body.hits and t - min(body.a_seen, body.b_seen) > _UP_S)

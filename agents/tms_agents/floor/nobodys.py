@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.bodies import WIDE_M, narrow
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
 from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
+from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import thin
 from tms_agents.floor.segmentation import BRIDGE
 
@@ -47,7 +48,9 @@ def costs(
     k = rows.size
     for column in range(k):
         feet(clusters, of, marks, free, prints, bodies, rows[column], t, cost[:, 2 * column : 2 * column + 2])
-    nobodys(clusters, of, prints, bodies, rows, t, cost[:, 2 * k :])
+    spans = np.empty(clusters.size)
+    spanned(clusters, spans)
+    nobodys(clusters, of, prints, bodies, rows, spans, t, cost[:, 2 * k :])
 
 
 @njit(cache=True)
@@ -57,10 +60,14 @@ def nobodys(
     prints: Any,
     bodies: Any,
     rows: NDArray[np.int64],
+    spans: Array,
     t: float,
     cost: Array,
 ) -> None:
-    """Fill ``cost`` (m, m): on its diagonal what it costs that a cluster is a foot of none of the bodies ``rows``."""
+    """Fill ``cost`` (m, m): on its diagonal what it costs that a cluster is a foot of none of the bodies ``rows``.
+
+    ``spans`` (m,) is what `spanned` gives.
+    """
     m, k = clusters.size, rows.size
     longest = LONGEST_SHOE_M if _shod(bodies, rows) else LEG_M
     for i in range(m):
@@ -74,11 +81,11 @@ def nobodys(
             for column in range(k):
                 body = bodies[rows[column]]
                 stands = stands or body.a_print == of[i] or body.b_print == of[i] or waits(body, c)
-                part = body.robot and np.hypot(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
+                part = body.robot and norm(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
                 stands = stands or part
             if not stands:
                 cost[i, i] = _THIN if thin(prints[of[i]]) else _RESTS
-        if _part(clusters, i, longest):
+        if spans[i] < longest:
             cost[i, i] = min(cost[i, i], _PART)
 
 
@@ -89,10 +96,12 @@ def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
         c = clusters[i]
         for b in range(bodies.size):
             body = bodies[b]
-            if body.used and not body.confirmed and t - body.seen < 0.5 and not _beside(body, bodies, c):
-                near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
-                near = max(min(near, np.hypot(c.x - body.x, c.y - body.y)) - 0.1, 0.0)
-                cost[i, i] = min(cost[i, i], _TENTATIVE + 0.5 * (near / 0.2) ** 2)
+            if body.used and not body.confirmed and t - body.seen < 0.5:
+                near = min(norm(c.x - body.ax, c.y - body.ay), norm(c.x - body.bx, c.y - body.by))
+                near = max(min(near, norm(c.x - body.x, c.y - body.y)) - 0.1, 0.0)
+                value = _TENTATIVE + 0.5 * (near / 0.2) ** 2
+                if value < cost[i, i] and not _beside(body, bodies, c):
+                    cost[i, i] = value
 
 
 @njit(cache=True)
@@ -127,27 +136,27 @@ def _beside(body: Any, bodies: Any, c: Any) -> bool:
         return False
     for b in range(bodies.size):
         other = bodies[b]
-        near = other.used and other.confirmed and np.hypot(other.x - body.x, other.y - body.y) < 0.6
+        near = other.used and other.confirmed and norm(other.x - body.x, other.y - body.y) < 0.6
         if near and too_wide(other, c) == 0.0:
             return True
     return False
 
 
 @njit(cache=True)
-def _part(clusters: Any, i: int, longest: float) -> bool:
-    """Whether cluster i may be the smaller part of a foot, ``longest`` m at most, whose middle something hides."""
-    c = clusters[i]
-    for o in range(clusters.size):
-        p = clusters[o]
-        if o == i or p.mirror != c.mirror or p.width < c.width or (p.width == c.width and o > i):
-            continue
-        between = max(c.first - p.last, p.first - c.last) - 1
-        if not _FEW <= between <= BRIDGE:
-            continue
-        hidden = c.cut != 0 and p.cut != 0
-        if (hidden or between <= _FADED) and np.hypot(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width) < longest:
-            return True
-    return False
+def spanned(clusters: Any, spans: Array) -> None:
+    """Fill ``spans`` (m,): how long a foot (m) would be of which a cluster is the smaller part, its middle hidden."""
+    for i in range(clusters.size):
+        c = clusters[i]
+        spans[i] = np.inf
+        for o in range(clusters.size):
+            p = clusters[o]
+            between = max(c.first - p.last, p.first - c.last) - 1
+            if not _FEW <= between <= BRIDGE:
+                continue
+            if o == i or p.mirror != c.mirror or p.width < c.width or (p.width == c.width and o > i):
+                continue
+            if (c.cut != 0 and p.cut != 0) or between <= _FADED:
+                spans[i] = min(spans[i], norm(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width))
 
 
 @njit(cache=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.candidates import candidates, near_movers
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
+from tms_agents.floor.norm import norm
 from tms_agents.floor.own_feet import may_be_his
 from tms_agents.floor.patience import patience
 from tms_agents.floor.prints import HARDLY, lay_before
@@ -138,7 +139,7 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
         return True
     for b in range(bodies.size):
         body = bodies[b]
-        if body.used and body.confirmed and body.stale and np.hypot(body.x - q.x, body.y - q.y) < _LOST_M:
+        if body.used and body.confirmed and body.stale and norm(body.x - q.x, body.y - q.y) < _LOST_M:
             # Who was found to be nowhere but on this is hardly there.
             since = q.rested if lay_before(q, body) else q.first
             nowhere = max(body.a_seen, body.b_seen) < 0.0 and t - since > _NOWHERE_S
@@ -149,7 +150,7 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
     for o in range(prints.size):
         p = prints[o]
         other = o != j and p.used and p.owner < 0 and t - p.last < 0.5 and abs(p.first - q.first) < _TOGETHER_S
-        if other and p.width > _FOOT_M and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
+        if other and p.width > _FOOT_M and norm(p.x - q.x, p.y - q.y) < _PAIR_M:
             return True
     return False
 
@@ -162,7 +163,7 @@ def _astride(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
     if body.robot or other < 0 or other == j or not prints[other].used or t - q.first < _ASTRIDE_S or q.whole == 0:
         return False
     p = prints[other]
-    return bool(t - p.last < 0.3 and p.first <= q.first and np.hypot(p.x - q.x, p.y - q.y) > _ASTRIDE_M)
+    return bool(t - p.last < 0.3 and p.first <= q.first and norm(p.x - q.x, p.y - q.y) > _ASTRIDE_M)
 
 
 @njit(cache=True)
@@ -189,12 +190,12 @@ def _third(q: Any, bodies: Any, t: float, rest_s: float) -> bool:
         body = bodies[b]
         if not body.used or not body.confirmed or body.stale or t - body.seen > 0.2:
             continue
-        d = min(np.hypot(body.ax - q.x, body.ay - q.y), np.hypot(body.bx - q.x, body.by - q.y))
+        d = min(norm(body.ax - q.x, body.ay - q.y), norm(body.bx - q.x, body.by - q.y))
         both = t - body.a_seen < 0.2 and t - body.b_seen < 0.2
         came = t - q.first > 1.25 * rest_s and q.first > max(body.a_since, body.b_since)
         if both and d > 0.15 + 0.5 * q.width and came:
             third = True
-        elif np.hypot(body.x - q.x, body.y - q.y) < 0.6:
+        elif norm(body.x - q.x, body.y - q.y) < 0.6:
             return False
     return third
 

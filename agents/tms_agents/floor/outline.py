@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.freespace import index_of
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -65,20 +66,20 @@ def _offset(u: float, v: float, su: float, sv: float, a: float, b: float) -> tup
     if abs(su) > a:
         x = u - (a if su > 0.0 else -a)
         y = max(abs(v) - b, 0.0) * (1.0 if v > 0.0 else -1.0)
-        if math.hypot(x, y) < best:
-            best, eu, ev = math.hypot(x, y), x, y
+        if norm(x, y) < best:
+            best, eu, ev = norm(x, y), x, y
     if abs(sv) > b:
         x = max(abs(u) - a, 0.0) * (1.0 if u > 0.0 else -1.0)
         y = v - (b if sv > 0.0 else -b)
-        if math.hypot(x, y) < best:
-            best, eu, ev = math.hypot(x, y), x, y
+        if norm(x, y) < best:
+            best, eu, ev = norm(x, y), x, y
     return eu, ev
 
 
 @njit(cache=True)
 def _window(x: float, y: float, radius: float, pose: Array, first: float, step: float, n: int) -> tuple[int, int]:
     """The beams from and to (exclusive) that may meet a disc; none where the sensor is in it."""
-    away = math.hypot(x - pose[0], y - pose[1])
+    away = norm(x - pose[0], y - pose[1])
     if away <= radius:
         return 0, 0
     middle = index_of(math.atan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
@@ -107,7 +108,7 @@ def fit(
     It was expected there by ``spread_m`` m and ``spread`` rad (standard deviations). ``how`` (6,) counts `ON` to `ALL`.
     """
     x0, y0, yaw0 = at
-    lo, hi = _window(x0, y0, math.hypot(a, b) + _NEAR_M, pose, first, step, ranges.size)
+    lo, hi = _window(x0, y0, norm(a, b) + _NEAR_M, pose, first, step, ranges.size)
     matrix, right = np.empty((3, 3)), np.empty(3)
     for turn in range(rounds + 1):
         x, y, c, s = at[0], at[1], math.cos(at[2]), math.sin(at[2])
@@ -126,7 +127,7 @@ def fit(
                 continue
             u, v = su + r * du, sv + r * dv
             eu, ev = _offset(u, v, su, sv, a, b)
-            off = math.hypot(eu, ev)
+            off = norm(eu, ev)
             new = states[i] == FOREGROUND
             if new and off < _NEAR_M and not (enters < np.inf and r > leaves):
                 inside = abs(u) < a and abs(v) < b
@@ -164,7 +165,7 @@ def fit(
         matrix[1, 1] += 1.0 / spread_m**2
         matrix[2, 2] += 1.0 / spread**2
         move = np.linalg.solve(matrix, right)
-        far = math.hypot(move[0], move[1])
+        far = norm(move[0], move[1])
         if far > _STEP_M:
             move[:2] *= _STEP_M / far
         move[2] = min(max(move[2], -_TURN), _TURN)
@@ -178,7 +179,7 @@ def fit(
 @njit(cache=True)
 def _add(matrix: Array, right: Array, eu: float, ev: float, u: float, v: float, weight: float) -> None:
     """Add to the normal equations that the rectangle should move by (eu, ev) at (u, v), all in its frame."""
-    away = math.hypot(eu, ev)
+    away = norm(eu, ev)
     if away < 1e-9:
         nu, nv = 1.0, 0.0
         if abs(u) < abs(v):
@@ -219,7 +220,7 @@ def search(
 ) -> float:
     """As `fit`, without knowing its yaw: the best of so many; how well it fits, 0 to 1 (`quality`)."""
     x, y = at[0], at[1]
-    away = max(math.hypot(x - pose[0], y - pose[1]), 1e-6)
+    away = max(norm(x - pose[0], y - pose[1]), 1e-6)
     # What is seen is this side of its middle.
     x += _BEHIND * min(a, b) * (x - pose[0]) / away
     y += _BEHIND * min(a, b) * (y - pose[1]) / away
@@ -253,5 +254,5 @@ def share_of(c: Any, at: Array, a: float, b: float, ranges: Array, rays: Array, 
         n += 1
         px, py = pose[0] + r * rays[i, 2] - x, pose[1] + r * rays[i, 3] - y
         eu, ev = _offset(co * px + s * py, co * py - s * px, su, sv, a, b)
-        on += math.hypot(eu, ev) < _ON_M
+        on += norm(eu, ev) < _ON_M
     return on / max(n, 1)

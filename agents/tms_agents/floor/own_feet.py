@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.gait import swap
+from tms_agents.floor.norm import norm
 from tms_agents.floor.shine import ALIKE, STRANGE, alike, strangeness
 from tms_agents.floor.strays import nobodys, take
 
@@ -29,7 +30,7 @@ def _own(body: Any, prints: Any, x: float, y: float, t: float, scattered: Array)
         q = prints[j]
         if not q.used or q.last < t or q.owner >= 0 or q.revealed or q.attached > 0.5:
             continue
-        away = np.hypot(q.x - x, q.y - y)
+        away = norm(q.x - x, q.y - y)
         off = strangeness(body, q, scattered)
         if _BESIDE_M < away < _STANCE_M and off < least:
             best, least = j, off
@@ -89,7 +90,7 @@ def may_be_his(q: Any, prints: Any, bodies: Any, t: float, scattered: Array) -> 
         body = bodies[b]
         if not body.used or not body.confirmed or body.robot or not alike(body, q, scattered):
             continue
-        feet, near = 0, np.hypot(body.x - q.x, body.y - q.y) < _BODY_M
+        feet, near = 0, norm(body.x - q.x, body.y - q.y) < _BODY_M
         for j, seen in ((body.a_print, body.a_seen), (body.b_print, body.b_seen)):
             if j >= 0 and t - seen < 0.3 and alike(body, prints[j], scattered):
                 feet += 1

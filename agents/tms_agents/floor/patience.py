@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import HARDLY
 from tms_agents.floor.shine import strangeness
 
@@ -52,7 +53,7 @@ def _may_be_foot(q: Any, bodies: Any, scattered: NDArray[np.float64]) -> bool:
         body = bodies[b]
         if not body.used or not body.confirmed or body.stale or body.robot:
             continue
-        away = np.hypot(body.x - q.x, body.y - q.y)
+        away = norm(body.x - q.x, body.y - q.y)
         if away < _UNDER_M or (away < _BESIDE_M and strangeness(body, q, scattered) < _LIKE):
             return True
     return False
@@ -64,7 +65,7 @@ def _somebody_near(q: Any, bodies: Any) -> bool:
     near = False
     for b in range(bodies.size):
         body = bodies[b]
-        near = near or (body.used and not body.robot and np.hypot(body.x - q.x, body.y - q.y) < _FAR_M)
+        near = near or (body.used and not body.robot and norm(body.x - q.x, body.y - q.y) < _FAR_M)
     return near
 
 
@@ -75,5 +76,5 @@ def has_left(q: Any, bodies: Any) -> bool:
         body = bodies[b]
         his = body.used and body.confirmed and body.label == q.whose
         if his and body.seen - min(body.a_seen, body.b_seen) < _SEEN_S:
-            return bool(np.hypot(body.x - q.x, body.y - q.y) > _FAR_M)
+            return bool(norm(body.x - q.x, body.y - q.y) > _FAR_M)
     return False

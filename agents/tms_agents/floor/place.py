@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.build import SHOES
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -85,11 +86,11 @@ def known(body: Any, t: float) -> tuple[int, float, Array]:
     one, two = t - stood < _NOW_S, t - other < _NOW_S
     case = BOTH if one and two else LATER if one else EARLIER if two else NONE
     terms = np.zeros((4, 2))
-    if np.hypot(qx - px, qy - py) < _STEP_M:
+    if norm(qx - px, qy - py) < _STEP_M:
         terms[0, 0], terms[0, 1] = qx - px, qy - py
     terms[1, 0], terms[1, 1] = body.vx, body.vy
     terms[2, 0] = min(max(qx - body.x, -_AWAY_M), _AWAY_M)
     terms[2, 1] = min(max(qy - body.y, -_AWAY_M), _AWAY_M)
-    if np.hypot(qx - ox, qy - oy) < _STRIDE_M:
+    if norm(qx - ox, qy - oy) < _STRIDE_M:
         terms[3, 0], terms[3, 1] = qx - ox, qy - oy
     return case, max(t - land, 0.0), terms

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.build import SHOD, SHOES
 from tms_agents.floor.freespace import FREE, WALLED, clear, silent
+from tms_agents.floor.norm import norm
 from tms_agents.floor.shine import STRANGE, strangeness
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ _WALKED_M = 0.15
 @njit(cache=True)
 def _same(q: Any, c: Any) -> bool:
     """Whether the cluster is what was at the print before something else hid it."""
-    if q.beams < _SPECK or np.hypot(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (
+    if q.beams < _SPECK or norm(c.x - q.x, c.y - q.y) > _SAME_M + _SAME_PER_M * c.near + (
         0.25 * q.width if c.cut else 0.0
     ):
         return False
@@ -109,7 +110,7 @@ def follow(
                 for j in range(p):
                     if not prints[j].used or taken[j]:
                         continue
-                    d = np.hypot(c.x - prints[j].x, c.y - prints[j].y)
+                    d = norm(c.x - prints[j].x, c.y - prints[j].y)
                     gate = 0.05 + 0.006 * c.near + 0.25 * min(max(c.width, prints[j].width), 0.4)
                     if d < gate and d < near[k]:
                         near[k], which[k] = d, j
@@ -140,7 +141,7 @@ def follow(
             q.owner, q.whose, q.owned, q.busy, q.revealed, q.given = -1, -1, -1e9, -1e9, 0, 0
             q.idle, q.alone = 0.0, 0.0
         q = prints[j]
-        off = np.hypot(c.x - q.x, c.y - q.y)
+        off = norm(c.x - q.x, c.y - q.y)
         if _grown(q, c):
             q.idle = 0.0
         if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
@@ -173,7 +174,7 @@ def follow(
             q.spread += gain * (off - q.spread)
             q.beams += gain * (c.n - q.beams)
             q.near, q.spacing = c.near, c.spacing
-        off = np.hypot(q.x - q.still_x, q.y - q.still_y)
+        off = norm(q.x - q.still_x, q.y - q.still_y)
         if off > (_STILL_M + _STILL * c.near) * (1.0 if q.whole > 4 else 2.0):
             q.still_x, q.still_y, q.still = q.x, q.y, t
     for j in range(p):
@@ -275,8 +276,8 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
                 body.b_print = -1 if body.b_print == j else body.b_print
             if not body.confirmed:
                 # Somebody who is not believed yet, but has walked.
-                walked = np.hypot(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3
-                if walked and np.hypot(body.x - q.x, body.y - q.y) < NEAR_M:
+                walked = norm(body.x - body.x0, body.y - body.y0) > _WALKED_M and t - body.seen < 0.3
+                if walked and norm(body.x - q.x, body.y - q.y) < NEAR_M:
                     q.busy = t
                 continue
             if body.a_print == j or body.b_print == j:
@@ -289,15 +290,15 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
                 q.busy = t
             if body.stale:
                 continue
-            d = np.hypot(body.x - q.x, body.y - q.y)
+            d = norm(body.x - q.x, body.y - q.y)
             parked = t - body.rest_at > _PARKED_S and d > 0.5 * (body.far + q.width) + _CLEAR_M
             if body.machine and (parked or body.rest_at - q.first > _DRIVES_S):
                 continue
             reach = NEAR_M + (0.3 if body.robot else 0.0)
             if t - body.a_seen < 0.6 and body.a_print != j:
-                d = min(d, np.hypot(body.ax - q.x, body.ay - q.y))
+                d = min(d, norm(body.ax - q.x, body.ay - q.y))
             if t - body.b_seen < 0.6 and body.b_print != j:
-                d = min(d, np.hypot(body.bx - q.x, body.by - q.y))
+                d = min(d, norm(body.bx - q.x, body.by - q.y))
             if d < reach:
                 q.busy = t
         if nobodys:

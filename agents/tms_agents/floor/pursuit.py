@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.footprint import accompany, drive, follow, take
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def _is_taken(footprints: Any, index: int, t: float) -> bool:
     reach = q.b if q.sure else SAME_M
     for o in range(footprints.size):
         p = footprints[o]
-        if o != index and p.used and p.sure and p.seen == t and math.hypot(p.x - q.x, p.y - q.y) < reach:
+        if o != index and p.used and p.sure and p.seen == t and norm(p.x - q.x, p.y - q.y) < reach:
             return True
     return False
 
@@ -118,7 +118,7 @@ def _find_again(footprints: Any, index: int, t: float) -> bool:
         if not new or p.a != q.a or p.b != q.b or not (left or p.pushed < _PUSHED):
             continue
         going_s = min(lost_s, _HIDES_S) if q.going else 0.0
-        away = math.hypot(p.x - q.x, p.y - q.y)
+        away = norm(p.x - q.x, p.y - q.y)
         reach = _NEAR_M + _SPEED * (lost_s if left or p.alone > _OFF_M else going_s)
         if away < min(reach, best_m):
             best, best_m = o, away
@@ -136,7 +136,7 @@ def goes(footprints: Any, seen: NDArray[np.bool_]) -> int:
     for index in range(footprints.size):
         q = footprints[index]
         alike = q.hits >= _HITS and q.fits >= _WELL and q.pushed <= _PUSHED
-        if seen[index] and q.used and not q.sure and alike and math.hypot(q.x - q.x0, q.y - q.y0) >= _WAY_M:
+        if seen[index] and q.used and not q.sure and alike and norm(q.x - q.x0, q.y - q.y0) >= _WAY_M:
             return index
     return -1
 
@@ -182,6 +182,6 @@ def is_near(footprints: Any, x: float, y: float, t: float) -> bool:
     """Whether a footprint is there and seen."""
     for index in range(footprints.size):
         q = footprints[index]
-        if q.used and t - q.seen < _ANEW_S and math.hypot(q.x - x, q.y - y) < SAME_M:
+        if q.used and t - q.seen < _ANEW_S and norm(q.x - x, q.y - y) < SAME_M:
             return True
     return False

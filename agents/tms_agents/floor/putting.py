@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.norm import norm
 from tms_agents.floor.segmentation import CLUSTER
 
 #: Feet stand when their prints are so old (s); a print is new for so long (s).
@@ -33,7 +34,7 @@ def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
         body = bodies[b]
         if not body.used or (body.stale and t - body.seen > 10.0):
             continue
-        away = np.hypot(c.x - body.x, c.y - body.y)
+        away = norm(c.x - body.x, c.y - body.y)
         stands = (
             body.confirmed
             and not body.robot
@@ -45,7 +46,7 @@ def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
             and t - max(prints[body.a_print].first, prints[body.b_print].first) > _STANDS_S
         )
         if stands and away < _REACH_M:
-            near = min(np.hypot(c.x - body.ax, c.y - body.ay), np.hypot(c.x - body.bx, c.y - body.by))
+            near = min(norm(c.x - body.ax, c.y - body.ay), norm(c.x - body.bx, c.y - body.by))
             if away < _STEP_M or near < _BESIDE_M + 0.5 * print_.width:
                 return False
             giver = b
@@ -69,11 +70,11 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
         shown, close = False, False
         for b in range(bodies.size):
             body = bodies[b]
-            away = np.hypot(body.x - q.x, body.y - q.y)
+            away = norm(body.x - q.x, body.y - q.y)
             if not body.used or away > _OTHER_M or (body.stale and t - body.seen > 10.0):
                 continue
-            apart = np.hypot(body.ax - body.bx, body.ay - body.by)
-            near = min(np.hypot(body.ax - q.x, body.ay - q.y), np.hypot(body.bx - q.x, body.by - q.y))
+            apart = norm(body.ax - body.bx, body.ay - body.by)
+            near = min(norm(body.ax - q.x, body.ay - q.y), norm(body.bx - q.x, body.by - q.y))
             shown = (
                 body.confirmed
                 and not body.robot
@@ -90,7 +91,7 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
             for o in range(prints.size):
                 p = prints[o]
                 pair = o != j and p.used and p.owner < 0 and not p.revealed and t - p.last < 0.3
-                if pair and np.hypot(p.x - q.x, p.y - q.y) < _PAIR_M:
+                if pair and norm(p.x - q.x, p.y - q.y) < _PAIR_M:
                     shown = False
                     break
         if shown:

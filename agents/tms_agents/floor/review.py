@@ -12,12 +12,15 @@ from tms_agents.floor.bodies import misled
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
 from tms_agents.floor.masks import distance
+from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import ALONE
 
 Array = NDArray[np.float64]
 
-#: What `review` finds of a body.
-NOTHING, CONFIRM, LOST, BACK, GONE, MOVED = 0, 1, 2, 3, 4, 5
+#: What `review` finds of a body; one that has moved and is broad, and new, may be furniture that is pushed.
+NOTHING, CONFIRM, LOST, BACK, GONE, MOVED, BROAD = 0, 1, 2, 3, 4, 5, 6
+#: What is new for so long (s) may turn out to be furniture.
+_NEW_S = 30.0
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
 #: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody
@@ -82,13 +85,13 @@ def _is_lone(body: Any, t: float) -> bool:
     no_shoe = wears_shoes(body) and body.width > LONGEST_SHOE_M
     if body.robot or body.wide > 0.6 or (body.width > _LEGS_M and not no_shoe):
         return False
-    apart = np.hypot(body.ax - body.bx, body.ay - body.by)
+    apart = norm(body.ax - body.bx, body.ay - body.by)
     a, b = t - body.a_seen, t - body.b_seen
     since = body.a_since if a < b else body.b_since
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
-    came = np.hypot(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH
+    came = norm(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH
     if (has_walked(body) or came) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
@@ -115,7 +118,7 @@ def _is_put(bodies: Any, b: int, t: float) -> bool:
     for o in range(bodies.size):
         other = bodies[o]
         person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < _PUT_S
-        if person and np.hypot(other.x - body.x0, other.y - body.y0) < _PUT_M:
+        if person and norm(other.x - body.x0, other.y - body.y0) < _PUT_M:
             return True
     return False
 
@@ -123,8 +126,8 @@ def _is_put(bodies: Any, b: int, t: float) -> bool:
 @njit(cache=True)
 def _has_come(body: Any, t: float, ranges: Array, longest: Array, pose: Array, first: float, step: float) -> bool:
     """Whether it has gone from where it began: of something dark that stands there parts flicker, here and there."""
-    a = body.a_seen == t and np.hypot(body.ax - body.x0, body.ay - body.y0) < _STILL_THERE_M
-    if a or (body.b_seen == t and np.hypot(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
+    a = body.a_seen == t and norm(body.ax - body.x0, body.ay - body.y0) < _STILL_THERE_M
+    if a or (body.b_seen == t and norm(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
         return True
     return bool(vacant(body.x0, body.y0, _BEGAN_M, ranges, longest, pose, first, step))
 
@@ -166,7 +169,7 @@ def _accompanied(bodies: Any, b: int, t: float) -> bool:
     for o in range(bodies.size):
         other = bodies[o]
         person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < 0.5
-        if person and np.hypot(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
+        if person and norm(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
             return True
     return False
 
@@ -177,7 +180,7 @@ def _comes_out(
 ) -> bool:
     """Whether who walks on behind something would be out of reach, or behind a wall, when it hides him no more."""
     dx, dy = body.x - body.told_x, body.y - body.told_y
-    far = np.hypot(dx, dy)
+    far = norm(dx, dy)
     if body.robot or far < _REST_M:
         return False
     for i in range(1, _LOOKS + 1):
@@ -216,12 +219,12 @@ def review(
             continue
         unseen = t - body.seen
         broad = body.wide > 0.3 or body.far > _FAR_M or body.from_furniture == 1
-        if broad and unseen == 0.0 and np.hypot(body.vx, body.vy) > 0.08:
+        if broad and unseen == 0.0 and norm(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
-        if unseen == 0.0 and np.hypot(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
+        if unseen == 0.0 and norm(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
             body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
         if not body.confirmed:
-            way = np.hypot(body.x - body.x0, body.y - body.y0)
+            way = norm(body.x - body.x0, body.y - body.y0)
             age = body.seen - body.first
             parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
             stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
@@ -236,9 +239,9 @@ def review(
             beside, halved, part = np.inf, False, False
             for o in range(bodies.size):
                 if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
-                    away = np.hypot(bodies[o].x - body.x, bodies[o].y - body.y)
+                    away = norm(bodies[o].x - body.x, bodies[o].y - body.y)
                     # Who begins beside somebody may be he, and what stands there what he has put down.
-                    beside = min(beside, away, np.hypot(bodies[o].x - body.x0, bodies[o].y - body.y0))
+                    beside = min(beside, away, norm(bodies[o].x - body.x0, bodies[o].y - body.y0))
                     # A part of somebody who is wide: legs that are one thing to the laser fall apart now and then.
                     part = part or away < 0.12 + 0.5 * bodies[o].width
                     # One foot of somebody there is not seen now: this may be it.
@@ -273,11 +276,11 @@ def review(
                     body.lone += dt * _FASTER
                 elif not behind or body.odd == ALONE:
                     body.lone += dt * (_FASTER if body.odd and not behind else 1.0)
-                elif np.hypot(foot_x - x, foot_y - y) > _STRIDE_M:
+                elif norm(foot_x - x, foot_y - y) > _STRIDE_M:
                     body.lone += dt / _SLOWER
             elif (
                 max(t - body.a_seen, t - body.b_seen) < 1.0
-                or np.hypot(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
+                or norm(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
             ):
                 # What was hidden meanwhile goes on being alone.
                 body.lone = 0.0
@@ -291,8 +294,9 @@ def review(
                 actions[b] = LOST if _is_known(body) or has_walked(body) else GONE
             elif body.stale:
                 actions[b] = BACK
-            elif np.hypot(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
-                actions[b] = MOVED
+            elif norm(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
+                new = t - body.first < _NEW_S and body.from_furniture == 0
+                actions[b] = BROAD if new and (body.wide > 0.5 or is_footless(body)) else MOVED
             continue
         if unseen > (_BEHIND_S if body.footprint else 0.12):
             view = clear(body.x, body.y, 0.15, ranges, states, longest, pose, first, step)
@@ -300,7 +304,7 @@ def review(
                 body.clear += dt
             elif view == UNSEEN or (view == WALLED and not inside):
                 # Where no walls are known, who walks on out of sight is soon far.
-                walks = not inside and np.hypot(body.x - body.told_x, body.y - body.told_y) > _REST_M
+                walks = not inside and norm(body.x - body.told_x, body.y - body.told_y) > _REST_M
                 body.clear += dt if walks else 0.5 * dt
             elif view == HIDDEN and not inside and _comes_out(body, ranges, states, longest, pose, first, step):
                 body.clear += 0.5 * dt
@@ -346,6 +350,6 @@ def doubled(bodies: Any) -> int:
         for o in range(bodies.size):
             other = bodies[o]
             lone = other.used and other.confirmed and other.single > 0.5 and other.label < body.label
-            if lone and np.hypot(other.x - body.x, other.y - body.y) < _UNITE_M:
+            if lone and norm(other.x - body.x, other.y - body.y) < _UNITE_M:
                 return b
     return -1

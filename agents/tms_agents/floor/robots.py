@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numba import njit
+
+from tms_agents.floor.norm import norm
 
 #: Sure after so many sightings, such a way (m), and with so few people beside it (share of the way).
 _HITS, _WAY_M, _ALONE = 15, 1.0, 0.4
@@ -33,7 +34,7 @@ def recognize(bodies: Any, least: float, most: float) -> int:
         alone = body.pushed < _ALONE and body.from_furniture <= 0 and body.both < 0.1 * body.hits
         if body.wide < 0.6 or body.hits < _HITS or not alone or not least - _MARGIN_M < body.far < most + _MARGIN_M:
             continue
-        if np.hypot(body.x - body.x0, body.y - body.y0) > _WAY_M:
+        if norm(body.x - body.x0, body.y - body.y0) > _WAY_M:
             body.machine, body.robot, body.from_furniture = 1, 1, -1
             found += 1
     return found
@@ -46,8 +47,8 @@ def _foot(c: Any, bodies: Any, t: float) -> bool:
         body = bodies[b]
         if not body.used or not body.confirmed or body.robot:
             continue
-        a_near = t - body.a_seen < _FOOT_S and np.hypot(c.x - body.ax, c.y - body.ay) < _FOOT_M
-        if a_near or (t - body.b_seen < _FOOT_S and np.hypot(c.x - body.bx, c.y - body.by) < _FOOT_M):
+        a_near = t - body.a_seen < _FOOT_S and norm(c.x - body.ax, c.y - body.ay) < _FOOT_M
+        if a_near or (t - body.b_seen < _FOOT_S and norm(c.x - body.bx, c.y - body.by) < _FOOT_M):
             return True
     return False
 
@@ -66,7 +67,7 @@ def gather(clusters: Any, bodies: Any, most: float, t: float) -> int:
         whole, kept = -1, 0
         for k in range(m):
             c = clusters[k]
-            part = c.width <= most + _MARGIN_M and np.hypot(c.x - x, c.y - y) < reach and not _foot(c, bodies, t)
+            part = c.width <= most + _MARGIN_M and norm(c.x - x, c.y - y) < reach and not _foot(c, bodies, t)
             if part and whole >= 0:
                 w = clusters[whole]
                 share = c.n / (w.n + c.n)

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -156,7 +157,7 @@ def _segment(
         bx = rays[b, o] + ranges[b] * rays[b, o + 2]
         by = rays[b, o + 1] + ranges[b] * rays[b, o + 3]
         c.spacing = c.near * step[min(a, n - 1)]
-        c.width = np.hypot(ax - bx, ay - by) + c.spacing
+        c.width = norm(ax - bx, ay - by) + c.spacing
         _lies(c, bx - ax, by - ay, rays[(a + b) // 2, o + 2], rays[(a + b) // 2, o + 3])
         c.attached = 0
         if a > 0 and (states[a - 1] == BACKGROUND or claimed[a - 1]) and _goes_on(ranges, longest, a - 1, a, b):
@@ -181,7 +182,7 @@ def _segment(
 @njit(cache=True)
 def _lies(c: Any, dx: float, dy: float, u: float, v: float) -> None:
     """Note which way the cluster points, from end (dx, dy) m to end, and how much across the beam (u, v)."""
-    far = np.hypot(dx, dy)
+    far = norm(dx, dy)
     c.ex, c.ey, c.slant = 0.0, 0.0, 1.0
     if far > 0.0:
         c.ex, c.ey = dx / far, dy / far
@@ -243,7 +244,7 @@ def _once(clusters: Any) -> int:
             for o in range(clusters.size):
                 p = clusters[o]
                 reach = _SAME_M + _SAME * max(c.width, p.width)
-                if p.mirror < 0 and np.hypot(c.x - p.x, c.y - p.y) < reach:
+                if p.mirror < 0 and norm(c.x - p.x, c.y - p.y) < reach:
                     twice = True
         if twice:
             # Otherwise one thing would be taken for two feet at one place.

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.build import SURE
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -136,7 +137,7 @@ def scatter(bodies: Any, clusters: Any, of: NDArray[np.int64], marks: Array, t: 
         alone = body.sure >= SURE
         for o in range(bodies.size):
             other = bodies[o]
-            near = o != b and other.used and np.hypot(other.x - body.x, other.y - body.y) < _ALONE_M
+            near = o != b and other.used and norm(other.x - body.x, other.y - body.y) < _ALONE_M
             alone = alone and not near
         if not alone:
             continue

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba import njit
 
 from tms_agents.floor.build import SHOES
 from tms_agents.floor.gait import swap
+from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import unlike_foot
 
 #: Nobody stands with the shoes or the legs so far apart (m) for so long (s).
@@ -28,7 +28,7 @@ def _stray(body: Any, prints: Any, t: float) -> int:
         return 0
     p, q = prints[a], prints[b]
     stood = t - max(p.first, q.first)
-    shod, apart = body.shoe >= SHOES, np.hypot(body.ax - body.bx, body.ay - body.by)
+    shod, apart = body.shoe >= SHOES, norm(body.ax - body.bx, body.ay - body.by)
     if stood > _STOOD_S and apart > _APART_M:
         first, second = unlike_foot(body, p), unlike_foot(body, q)
         if first != second:

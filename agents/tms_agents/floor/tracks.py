@@ -16,6 +16,7 @@ from tms_agents.floor.masks import Area
 from tms_agents.floor.place import place, tell
 from tms_agents.floor.review import (
     BACK,
+    BROAD,
     CONFIRM,
     GONE,
     LOST,
@@ -34,8 +35,6 @@ from tms_agents.floor.state import CONCEALED, SEATED
 _DOUBTED = 0.5
 #: What began as a piece of furniture and is still so broad (m) in the mean is one.
 _PIECE_M = 0.25
-#: What is new for so long (s) may turn out to be furniture.
-_NEW_S = 30.0
 #: What is pushed is left within this (m).
 _PUSHED_M = 2.0
 #: What has moved with people beside it for less than this share of the way has moved by itself.
@@ -126,12 +125,7 @@ class Tracks:
                 events.append(Back(t, label, xy))
             elif action == CONFIRM:
                 events += self._confirm(index, t, new_label, was_furniture)
-            elif (
-                t - body["first"] < _NEW_S
-                and body["from_furniture"] == 0
-                and (body["wide"] > 0.5 or is_footless(body))
-                and (body["pushed"] > 0.8 or was_furniture(body))
-            ):
+            elif action == BROAD and (body["pushed"] > 0.8 or was_furniture(body)):
                 # Furniture that is pushed is seen to be missing only when the one who pushes has left its place.
                 self._association.decide(index)
                 body["confirmed"], body["from_furniture"], body["robot"] = 0, 1, 0

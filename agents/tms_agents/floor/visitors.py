@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.candidates import FAR_M
+from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def _attend(things: Any, bodies: Any, t: float, movers: NDArray[np.int64], gaps:
         for b in range(bodies.size):
             body = bodies[b]
             if body.used and body.confirmed:
-                away = np.hypot(thing.x - body.x, thing.y - body.y)
+                away = norm(thing.x - body.x, thing.y - body.y)
                 if away < FAR_M:
                     _note(movers[k], gaps[k], body.label, away)
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from tms_agents.floor.assignment import assign, reassign, solve
+from tms_agents.floor.assignment import assign, reassign, solve, work
 
 
 @settings(max_examples=100)
@@ -18,7 +18,7 @@ def test_the_sum_is_the_least(rows: int, extra: int, seed: int, coarse: bool) ->
         cost = np.round(cost)
     cost[np.random.default_rng(seed + 1).uniform(size=cost.shape) < 0.2] = 1e6
     columns = np.full(rows, -1)
-    total = assign(cost, columns)
+    total = assign(cost, rows + extra, np.inf, columns)
     best = cost[linear_sum_assignment(cost)].sum()
     assert len(set(columns.tolist())) == rows
     assert np.isclose(cost[np.arange(rows), columns].sum(), total)
@@ -43,16 +43,16 @@ def test_the_next_best_is_that_of_a_table_without_what_is_barred(
         rng.uniform(size=(rows, 2 * people)) < share, rng.uniform(-3.0, 20.0, (rows, 2 * people)), 1e6
     )
     cost[np.arange(rows), 2 * people + np.arange(rows)] = rng.uniform(2.0, 12.0, rows)
-    columns, of_column = np.empty(rows, np.int64), np.empty(cost.shape[1], np.int64)
-    u, v = np.empty(rows), np.empty(cost.shape[1])
-    best = solve(cost, columns, of_column, u, v)
+    columns, solved = np.empty(rows, np.int64), work(rows + 2, cost.shape[1] + 5)
+    best = solve(cost, 2 * people, 1e6, columns, solved)
+    assert np.isclose(best, cost[linear_sum_assignment(cost)].sum())
     for row in np.flatnonzero(columns < 2 * people).tolist():
         barred = int(columns[row]) // 2 * 2
         without = cost.copy()
         without[row, barred : barred + 2] = 1e6
         expected = without[linear_sum_assignment(without)].sum()
         other = np.full(rows, -1)
-        total = reassign(cost, columns, of_column, u, v, row, barred, most, other)
+        total = reassign(cost, columns, row, barred, most, other, solved)
         if expected - best < 0.99 * most:
             assert np.isclose(total, expected)
             assert len(set(other.tolist())) == rows
@@ -60,3 +60,5 @@ def test_the_next_best_is_that_of_a_table_without_what_is_barred(
             assert np.isclose(cost[np.arange(rows), other].sum(), total)
         elif expected - best > 1.01 * most:
             assert total == np.inf
+    # What a search leaves behind is nothing to the next.
+    assert solve(cost, 2 * people, 1e6, columns, solved) == best

@@ -172,7 +172,7 @@ def test_what_is_too_thin_for_a_foot_costs_less_to_be_nobodys() -> None:
     shapes: list[dict[str, float]] = [{"width": 0.1}, {"width": 0.06}, {"width": 0.06, "whole": 3}]
     for each, shape in zip(cost, shapes, strict=True):
         clusters["width"] = shape["width"]
-        nobodys(clusters, one, resting(3.0, **shape), empty(BODY, 1), one[:0], NOW, each)
+        nobodys(clusters, one, resting(3.0, **shape), empty(BODY, 1), one[:0], np.array([np.inf]), NOW, each)
     wide, thin, in_part = cost[:, 0, 0]
     assert thin < wide - 1.0
     assert in_part == wide
