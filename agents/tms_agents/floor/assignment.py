@@ -34,9 +34,10 @@ class Work(NamedTuple):
     reached: NDArray[np.bool_]
 
 
-@njit(cache=True)
+@njit(cache=False)
 def work(m: int, n: int) -> Work:
     """For tables of m rows and n columns at most."""
+    # Not cached: loaded from a cache after a kernel that contains it, what gives Python a named tuple crashes.
     columns, counts, of_column = np.empty((m, n), np.int64), np.empty(m, np.int64), np.empty(n, np.int64)
     path, met = np.empty(n, np.int64), np.empty(n, np.int64)
     shortest, reached = np.full(n, np.inf), np.zeros(n, np.bool_)

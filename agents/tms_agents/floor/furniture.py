@@ -27,6 +27,8 @@ _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 _THIN_WIDTH_M = 0.01
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
+#: What was somebody's foot, and has not been seen for so long (s), was lifted.
+_LIFTED_S = 1.0
 #: Legs that came so long ago (s) at most tell of one that is believed later; so near (m) it is the same leg.
 _LEGS_S, _SAME_LEG_M = 60.0, 0.05
 #: The ranges of one surface differ so little from beam to beam (m); something thin hides so much of it (m).
@@ -127,6 +129,8 @@ def _legs(print_: Any, prints: Any, known: list[Leg]) -> bool:
     away = np.hypot(prints["x"] - print_["x"], prints["y"] - print_["y"])
     thin = (prints["used"] == 1) & (prints["width"] < _THIN_M) & (prints["hits"] >= 4) & (prints["owner"] < 0)
     since = np.abs(prints["rested"] - print_["rested"])
+    foot = (prints["revealed"] == 0) & (prints["owned"] >= prints["first"])
+    thin &= ~(foot & (print_["last"] - prints["last"] > _LIFTED_S))
     legs = thin & (away > _LEGS_M) & (away < _GROUP_M) & (since < np.where(prints["revealed"] > 0, 6.0, _TOGETHER_S))
     count = int(np.count_nonzero(legs))
     for since, x, y in known:

@@ -63,6 +63,9 @@ _ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
 _LEANS_S = 6.0
 #: What joins it may be a thing while who stands or drives beside both has not gone, for so long (s).
 _JOINED_S = 3.0
+#: A part of something is joined to it in this share of the scans; what somebody brought who stayed for so long (s), and
+#: lies close to something, in less than that.
+_JOINED, _STAYS_S, _CLOSE = 0.5, 1.0, 0.75
 #: Surfaces lie this uncertain behind what is seen (m²).
 _SURFACE_VAR = 0.006**2
 
@@ -183,6 +186,12 @@ def _plain(q: Any, age: float, t: float, rest_s: float) -> bool:
 
 
 @njit(cache=True)
+def _brought(q: Any) -> bool:
+    """Whether the print, most often seen whole, came to rest while somebody was there, and he stayed for a moment."""
+    return bool(q.busy - q.rested > _STAYS_S and q.beams >= 1.5 and 2 * q.whole > q.hits)
+
+
+@njit(cache=True)
 def _third(q: Any, bodies: Any, t: float, rest_s: float) -> bool:
     """Whether the print came to somebody who stands on two other feet."""
     third = False
@@ -230,7 +239,7 @@ def _ripe(
         leans = age > (_LEANS_S if t - q.busy < alone_s else _JOINED_S if q.width < width_m else 0.0)
         if not astride and q.given == 0 and may_be_his(q, prints, bodies, t, scattered):
             continue
-        if q.attached > 0.5 and q.given == 0:
+        if q.attached > (_CLOSE if _brought(q) else _JOINED) and q.given == 0:
             if leans:
                 ripe[j] = FURNITURE
                 count += 1

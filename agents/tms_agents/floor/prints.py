@@ -160,7 +160,7 @@ def follow(
         q.looks += 1
         q.last = t
         q.covered += c.cut == 2
-        q.attached += 0.15 * (c.attached - q.attached)
+        q.attached += max(0.05, 1.0 / q.hits) * (c.attached - q.attached)
         q.sensor, q.first_beam, q.last_beam = sensor, c.first, c.last
         # What is black or glossy is hardly ever seen whole: all that is seen of it counts.
         hardly = c.cut and (q.whole == 0 or q.hits > HARDLY * q.whole)

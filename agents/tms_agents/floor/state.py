@@ -11,8 +11,9 @@ import numpy as np
 #: (x, y) m mean of where it was seen, first time seen since it was hidden, since when it has rested there, hidden or
 #: not, last time seen, hits, looks and mutes (scans since that hit it, that could have, that saw nothing at all there;
 #: of those that hit it, that saw all of it, and only what something new before it left), width m, spread m (mean
-#: distance from the mean), owner (index of the body whose foot it is, -1: nobody's), whose (label
-#: of the last one, until owned), busy (when a body was last near),
+#: distance from the mean), attached (in which share of the last twenty sightings or so it was joined to the
+#: background), owner (index of the body whose foot it is, -1: nobody's), whose (label of the last one, until owned),
+#: busy (when a body was last near),
 #: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
 #: alone (s for which it was all that was seen of its owner),
 #: revealed (`furniture.LOOKS`, `furniture.MOVED`), how bright it is (`shine.measure`) and of how many sightings,

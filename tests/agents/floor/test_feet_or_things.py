@@ -11,7 +11,7 @@ from floor_rooms import Room, thing, together, walker
 from tms_agents.floor import Appeared, FloorSettings, Scene
 from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.nobodys import costs, known, nobodys
-from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.objects import FURNITURE, OBJECT, Objects
 from tms_agents.floor.prints import attend
 from tms_agents.floor.putting import count_feet
 from tms_agents.floor.segmentation import CLUSTER
@@ -34,10 +34,10 @@ def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
     return prints
 
 
-def told(prints: np.ndarray, *, robots: bool = False) -> bool:
+def told(prints: np.ndarray, kind: int = OBJECT, *, robots: bool = False) -> bool:
     objects = Objects(empty(THING, 1), FloorSettings())
     objects.robot_at = NOW - 10.0 if robots else -math.inf
-    return objects.ripe(prints, empty(BODY, 1), NOW, expected()) == [(0, OBJECT)]
+    return objects.ripe(prints, empty(BODY, 1), NOW, expected()) == [(0, kind)]
 
 
 @pytest.mark.parametrize(("off", "counted"), [(0.3, 1.0), (0.17, 0.25), (0.1, 0.0)])
@@ -52,6 +52,16 @@ def test_what_lies_close_to_one_of_two_feet_is_told_from_it_later_and_what_touch
     bodies["ay"] = bodies["by"] = prints["y"]
     count_feet(prints, bodies, NOW, 1.0)
     assert prints["spare"][0] == pytest.approx(counted)
+
+
+@pytest.mark.parametrize(
+    ("attached", "stayed_s", "whole", "kind"),
+    [(0.6, 2.0, 300, OBJECT), (0.6, 0.5, 300, FURNITURE), (0.6, 2.0, 100, FURNITURE), (0.9, 2.0, 300, FURNITURE)],
+)
+def test_what_somebody_put_down_close_to_a_wall_is_a_thing_though_it_often_seems_a_part_of_it(
+    attached: float, stayed_s: float, whole: int, kind: int
+) -> None:
+    assert told(resting(30.0, attached=attached, whole=whole, busy=NOW - 30.0 + stayed_s), kind)
 
 
 def test_what_is_as_wide_as_a_shoe_from_its_side_waits() -> None:

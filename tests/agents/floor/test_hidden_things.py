@@ -101,12 +101,20 @@ def test_what_met_a_half_hidden_thing_tells_that_it_has_gone(side: int) -> None:
     assert looked(things, gone[::side], sensor=1) == HIDDEN
 
 
-def seen(prints: np.ndarray, x: float, width: float, t: float) -> None:
+def seen(prints: np.ndarray, x: float, width: float, t: float, *, attached: bool = False) -> None:
     """One cluster at (x, 0), or nothing at all where its width is 0."""
     clusters = np.zeros(1 if width else 0, CLUSTER)
     clusters["x"], clusters["width"], clusters["near"], clusters["n"] = x, width, x, 5
-    clusters["spacing"], clusters["mirror"] = 0.01, -1
+    clusters["spacing"], clusters["mirror"], clusters["attached"] = 0.01, -1, attached
     follow(clusters, np.zeros(clusters.size, np.int64), prints, 0, t, *COVERED)
+
+
+def test_what_noise_joins_to_a_wall_now_and_then_is_not_joined_to_it_when_that_happens_in_a_row() -> None:
+    for every, joined in ((5, False), (1, True)):
+        prints = empty(PRINT, 4)
+        for k in range(35):
+            seen(prints, 2.0, 0.08, k * PERIOD_S, attached=k % every == 0 or k >= 30)
+        assert (prints["attached"][0] > 0.5) == joined
 
 
 @pytest.mark.parametrize(
@@ -144,6 +152,15 @@ def test_three_legs_that_came_together_are_a_chair_and_parts_of_one_black_thing_
     assert not Furniture().explains(close[0], close, [], 5.0)
     black = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4), mutes=30)
     assert not Furniture().explains(black[0], black, [], 5.0)
+
+
+@pytest.mark.parametrize(("owned", "unseen_s", "legs"), [(1.0, 2.0, False), (1.0, 0.2, True), (-1.0, 2.0, True)])
+def test_feet_that_were_lifted_are_not_the_other_legs_of_a_chair(owned: float, unseen_s: float, legs: bool) -> None:
+    """But a leg that somebody seemed to stand on is there still, and one that nobody did may be hidden."""
+    prints = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4))
+    prints["last"], prints["owned"] = 5.0, -1.0
+    prints["owned"][1:], prints["last"][1:] = owned, 5.0 - unseen_s
+    assert Furniture().explains(prints[0], prints, [], 5.0) == legs
 
 
 @pytest.mark.parametrize(
