@@ -144,7 +144,10 @@ def _beside(body: Any, bodies: Any, c: Any) -> bool:
 
 @njit(cache=True)
 def spanned(clusters: Any, spans: Array) -> None:
-    """Fill ``spans`` (m,): how long a foot (m) would be of which a cluster is the smaller part, its middle hidden."""
+    """Fill ``spans`` (m,): how long a foot (m) would be of which a cluster is the smaller part, its middle hidden.
+
+    Infinity where it can be a part of none.
+    """
     for i in range(clusters.size):
         c = clusters[i]
         spans[i] = np.inf
