@@ -22,6 +22,8 @@ from tms_client.cli import CommandError
 
 _ADDRESS = re.compile(r"(http://\S+)")
 START_S = 120.0
+#: So long (s) a process may take to end in order: on a slow computer it may be compiling a kernel.
+_ORDER_S = 60.0
 USUAL_PORT = 8080
 
 
@@ -111,7 +113,7 @@ def stop(process: subprocess.Popen[Any]) -> None:
         process.terminate()
         try:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(15.0)
+                process.wait(_ORDER_S)
         finally:  # it hangs, or Ctrl-C came again: no server is left behind
             if process.poll() is None:
                 process.kill()
