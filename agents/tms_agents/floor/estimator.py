@@ -46,7 +46,7 @@ _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
 #: Of saved states; 12: robots' footprints.
-_FORMAT = 12
+_FORMAT = 13
 
 
 class FloorEstimator:

@@ -33,6 +33,8 @@ UNLIKELY = 1e6
 _ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
 #: Who has sat down gets up with a foot so near (m) one of his.
 _RISES_M = 0.9
+#: Who stands for sure has both feet within this (m).
+_HELD_M = 0.33
 #: Time for which a new print counts as a fresh step (s).
 FRESH_S = 1.0
 #: Two feet side by side are hardly wider (m).
@@ -194,6 +196,8 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
     if not body.confirmed and print_ >= 0 and q.rested < body.first - 0.25:
         return
     if not body.confirmed and _strides(body, c) > LONGEST_M:
+        return
+    if t < body.held and _strides(body, c) > _HELD_M:
         return
     if body.robot or body.wide > 0.6:
         # One that is seen does not jump to another that stands beside it.

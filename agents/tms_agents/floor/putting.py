@@ -1,4 +1,7 @@
-"""Nobody has three feet: what appears or lies beside somebody both of whose feet are seen is a thing."""
+"""Nobody has three feet: what appears or lies beside somebody both of whose feet are seen is a thing.
+
+Nor is it a foot what flickers at the edge of a thing, now here, now there, as if it were put down anew.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,10 @@ _OTHER_M = 1.0
 _FEET_M = (0.06, 0.7)
 #: A print so near (m) may be the other foot of somebody who is not known yet.
 _PAIR_M = 0.45
+#: What has been nobody's for so long (s), and for such a share of the time, is a thing if it is so wide (m) at most.
+_IDLE_S, _IDLE, _THING_M = 3.0, 0.7, 0.25
+#: What flickers at its edge is so wide (m) at most, and so near it (m).
+_SPECK_M, _EDGE_M = 0.09, 0.03
 
 
 @njit(cache=True)
@@ -99,22 +106,35 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
 
 
 @njit(cache=True)
+def _is_edge(c: Any, print_: int, prints: Any, t: float) -> bool:
+    """Whether the cluster is what flickers at the edge of something that has been nobody's foot for long."""
+    for j in range(prints.size):
+        q = prints[j]
+        if j == print_ or not q.used or t - q.last > _NEW_S or q.width > _THING_M:
+            continue
+        beside = norm(c.x - q.x, c.y - q.y) < 0.5 * (q.width + c.width) + _EDGE_M
+        if beside and q.idle > max(_IDLE_S, _IDLE * (t - q.rested)):
+            return True
+    return False
+
+
+@njit(cache=True)
 def _set_aside(
     clusters: Any, of: NDArray[np.int64], prints: Any, bodies: Any, width_m: float, t: float, scratch: Any
 ) -> int:
     feet: int = clusters.size
     k = 0
     while k < feet:
-        given = False
-        if of[k] >= 0:
+        thing = clusters[k].width < _SPECK_M and _is_edge(clusters[k], of[k], prints, t)
+        if of[k] >= 0 and not thing:
             q = prints[of[k]]
             if q.hits == 1:
                 q.given = 0
             new = t - q.first <= _NEW_S and q.owner < 0 and q.hits < 3 and clusters[k].width < width_m
             if new and not q.given and _put(clusters[k], q, prints, bodies, t):
                 q.given = 1
-            given = q.given == 1
-        if not given:
+            thing = q.given == 1
+        if not thing:
             k += 1
             continue
         feet -= 1

@@ -92,7 +92,7 @@ def _is_lone(body: Any, t: float) -> bool:
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
     came = norm(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH
-    if (has_walked(body) or came) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
+    if (has_walked(body) or came) and _is_two(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
@@ -102,10 +102,21 @@ def _is_lone(body: Any, t: float) -> bool:
 
 
 @njit(cache=True)
+def _is_two(body: Any) -> bool:
+    """Whether it has shown both feet as often as a person does since it was last found to be nowhere."""
+    return bool(body.doubted == 0 or body.both - body.doubted >= _both_feet(body))
+
+
+@njit(cache=True)
 def has_walked(body: Any) -> bool:
     """Whether it has come on two feet, step by step."""
-    least = _BOTH_SHOES if body.shoe >= SHOES or wears_shoes(body) else _BOTH_LEGS
-    return bool(body.own_pace_n >= _STEPS and body.both >= least)
+    return bool(body.own_pace_n >= _STEPS and body.both >= _both_feet(body))
+
+
+@njit(cache=True)
+def _both_feet(body: Any) -> int:
+    """In how many scans a person has shown both feet."""
+    return _BOTH_SHOES if body.shoe >= SHOES or wears_shoes(body) else _BOTH_LEGS
 
 
 @njit(cache=True)

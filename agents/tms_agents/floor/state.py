@@ -68,8 +68,10 @@ CONCEALED, SEATED = 1, 2
 #: how likely that name is. Further: the number of its `FOOTPRINT` (0: none), for how long (s) and where it has stood on
 #: one foot alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it
 #: has stayed (rest), how wide the legs are (m, 0: unknown), whether what is seen of it is no foot, and why (odd,
-#: `prints.UNLIKE`), and the line on which the shoe last seen from its side lay (ex, ey), and when (e_at). Of one not
-#: believed yet: in how many scans it was seen (hits), could have been (looks), and was or should have been (due).
+#: `prints.UNLIKE`), the line on which the shoe last seen from its side lay (ex, ey), and when (e_at), in how many scans
+#: both feet had been seen (both) when it was last found to be nowhere (doubted), and until when it stays where it was
+#: put back (held, s). Of one not believed yet: in how many scans it was seen (hits), could have been (looks), and was
+#: or should have been (due).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -170,6 +172,8 @@ BODY = np.dtype(
         ("look", "f8"),
         ("look_n", "i8"),
         ("sure", "f8"),
+        ("doubted", "i8"),
+        ("held", "f8"),
     ]
 )
 

@@ -18,6 +18,8 @@ _SHOES_M, _LEGS_M, _ASTRIDE_S = 0.48, 0.4, 5.5
 _APART_M, _STOOD_S = 0.33, 2.0
 #: What has been nobody's for so long (s) is no foot rather than what came last.
 _IDLE_S = 1.0
+#: Two legs side by side, one thing to the laser, look wider (m) than one, and at most so wide.
+_PAIR_M = (0.16, 0.3)
 
 
 @njit(cache=True)
@@ -32,7 +34,10 @@ def _stray(body: Any, prints: Any, t: float) -> int:
     if stood > _STOOD_S and apart > _APART_M:
         first, second = unlike_foot(body, p), unlike_foot(body, q)
         if first != second:
-            return 1 if first else 2
+            odd, other = (p, q) if first else (q, p)
+            # Both legs stood there before the other came.
+            both = not shod and _PAIR_M[0] < odd.width < _PAIR_M[1] and other.first - odd.first > _STOOD_S
+            return 1 if first != both else 2
     if stood < _ASTRIDE_S or apart < (_SHOES_M if shod else _LEGS_M):
         return 0
     if max(p.idle, q.idle) > _IDLE_S:

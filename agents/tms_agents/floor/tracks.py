@@ -216,6 +216,7 @@ class Tracks:
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
             body["lone"] = body["wide"] = 0.0
+            body["doubted"] = body["both"]
             body["quality"] = max(body["quality"], _DOUBTED)
         body["stale"] = CONCEALED
         if seated and body["clear"] > _CLEAR_S:

@@ -13,7 +13,7 @@ from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.nobodys import costs, known, nobodys
 from tms_agents.floor.objects import FURNITURE, OBJECT, Objects
 from tms_agents.floor.prints import attend
-from tms_agents.floor.putting import count_feet
+from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
@@ -92,6 +92,44 @@ def test_who_stands_on_two_feet_side_by_side_keeps_both(apart: float, released: 
     bodies["a_seen"] = bodies["b_seen"] = NOW
     bodies["a_print"], bodies["b_print"] = 0, 1
     assert release(bodies, prints, NOW) == released
+
+
+@pytest.mark.parametrize(
+    ("width", "later_s", "stays"), [(0.24, 3.0, 0), (0.24, -3.0, 1), (0.24, 0.5, 1), (0.35, 3.0, 1)]
+)
+def test_both_legs_side_by_side_that_stood_there_first_are_no_thing(width: float, later_s: float, stays: int) -> None:
+    """They look twice as wide as one; what was put down beside them is not whole in view."""
+    bodies, prints = empty(BODY, 1), empty(PRINT, 2)
+    prints["used"], prints["last"], prints["width"] = 1, NOW, (width, 0.06)
+    prints["first"] = NOW - 10.0, NOW - 10.0 + later_s
+    prints["hits"] = prints["looks"] = 30
+    prints["whole"] = 30, 2
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["leg"], bodies["bx"], bodies["y"] = 0.12, 0.36, 0.0
+    bodies["a_seen"] = bodies["b_seen"] = NOW
+    bodies["a_print"], bodies["b_print"] = 0, 1
+    assert release(bodies, prints, NOW) == 1
+    assert {int(bodies["a_print"][0]), int(bodies["b_print"][0])} == {stays, -1}
+
+
+@pytest.mark.parametrize(
+    ("width", "idle", "off", "foot"),
+    [
+        (0.02, 8.0, 0.04, False),
+        (0.02, 8.0, 0.12, True),  # not at its edge
+        (0.12, 8.0, 0.04, True),  # no speck
+        (0.02, 4.0, 0.04, True),  # somebody has stood there for half of the time
+        (0.02, 2.0, 0.04, True),
+    ],
+)
+def test_what_flickers_at_the_edge_of_a_thing_is_no_foot(width: float, idle: float, off: float, foot: bool) -> None:
+    prints, clusters = (
+        np.concatenate([resting(10.0, width=0.06, idle=idle), resting(0.2, width=width)]),
+        np.zeros(1, CLUSTER),
+    )
+    prints["x"][1] = clusters["x"] = off
+    clusters["width"], clusters["n"], clusters["cut"] = width, 2, 1
+    assert set_aside(clusters, np.ones(1, np.int64), prints, empty(BODY, 1), 0.3, NOW) == foot
 
 
 @pytest.mark.parametrize(("away", "may_step"), [(0.7, True), (1.6, False)])

@@ -9,7 +9,9 @@ import pytest
 
 from tms_agents.floor import FloorEstimator, Scene, Sensor
 from tms_agents.floor.left_feet import take_back
+from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.prints import attend
+from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, empty
 from tms_agents.simulation.floor_world import FloorWorld
@@ -51,6 +53,21 @@ def test_who_leaves_both_feet_behind_stands_on_them_and_who_walks_is_somebody_ne
     assert (goes_on["used"], goes_on["confirmed"], goes_on["vx"]) == (1, 0, 0.9)
     assert (goes_on["x"], goes_on["y"], goes_on["a_print"], goes_on["b_print"]) == pytest.approx((3.1, 3.1, 2, 3))
     assert take_back(bodies, prints, NOW, expected()) == 0  # once is enough
+
+
+@pytest.mark.parametrize(("later", "away", "may_step"), [(0.1, 0.5, False), (0.1, 0.25, True), (4.0, 0.5, True)])
+def test_who_stands_on_them_again_does_not_take_the_next_step_of_the_passer(
+    later: float, away: float, may_step: bool
+) -> None:
+    bodies, prints = walks(), left()
+    take_back(bodies, prints, NOW, expected())
+    clusters, one = np.zeros(1, CLUSTER), np.full(1, 4)
+    clusters["x"], clusters["y"], clusters["n"], clusters["width"], clusters["spacing"] = 2.2 + away, 2.0, 6, 0.1, 0.015
+    prints = np.concatenate([prints, prints[3:]])
+    prints["first"][4] = prints["rested"][4] = NOW + later
+    cost = np.zeros((1, 2))
+    feet(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, 0, NOW + later, cost)
+    assert bool(cost.min() < UNLIKELY) == may_step
 
 
 @pytest.mark.parametrize(

@@ -138,6 +138,18 @@ def test_who_came_on_two_feet_may_stand_with_one_behind_the_other(
     assert (LOST in found(bodies, 14.0)) == lost
 
 
+@pytest.mark.parametrize(
+    ("since", "shoe", "lost"), [(40, 0.0, False), (10, 0.0, True), (10, 1.0, False), (2, 1.0, True)]
+)
+def test_who_was_found_to_be_nowhere_shows_two_feet_before_one_hides_the_other(
+    since: int, shoe: float, lost: bool
+) -> None:
+    """Not everything that is put down is the one foot that is seen of him."""
+    bodies = standing(2.0, 2.1, shoe=shoe)
+    bodies["doubted"] = bodies["both"] - since
+    assert (LOST in found(bodies, 14.0)) == lost
+
+
 @pytest.mark.parametrize(("shoe", "seconds", "lost"), [(1.0, 50.0, False), (1.0, 80.0, True), (0.0, 80.0, False)])
 def test_one_shoe_does_not_hide_behind_the_other_for_long(shoe: float, seconds: float, lost: bool) -> None:
     assert (LOST in found(standing(2.0, 2.2, shoe=shoe), seconds)) == lost
