@@ -33,8 +33,8 @@ UNLIKELY = 1e6
 _ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
 #: Who has sat down gets up with a foot so near (m) one of his.
 _RISES_M = 0.9
-#: Who stands for sure has both feet within this (m).
-_HELD_M = 0.33
+#: Who stands for sure has both feet within this (m), until none was seen for so long (s).
+_HELD_M, _LIFTED_S = 0.33, 0.5
 #: Time for which a new print counts as a fresh step (s).
 FRESH_S = 1.0
 #: Two feet side by side are hardly wider (m).
@@ -197,7 +197,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         return
     if not body.confirmed and _strides(body, c) > LONGEST_M:
         return
-    if t < body.held and _strides(body, c) > _HELD_M:
+    if t < body.held and t - max(body.a_seen, body.b_seen) < _LIFTED_S and _strides(body, c) > _HELD_M:
         return
     if body.robot or body.wide > 0.6:
         # One that is seen does not jump to another that stands beside it.

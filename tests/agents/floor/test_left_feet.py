@@ -55,7 +55,7 @@ def test_who_leaves_both_feet_behind_stands_on_them_and_who_walks_is_somebody_ne
     assert take_back(bodies, prints, NOW, expected()) == 0  # once is enough
 
 
-@pytest.mark.parametrize(("later", "away", "may_step"), [(0.1, 0.5, False), (0.1, 0.25, True), (4.0, 0.5, True)])
+@pytest.mark.parametrize(("later", "away", "may_step"), [(0.1, 0.5, False), (0.1, 0.25, True), (0.7, 0.5, True)])
 def test_who_stands_on_them_again_does_not_take_the_next_step_of_the_passer(
     later: float, away: float, may_step: bool
 ) -> None:
