@@ -21,7 +21,7 @@ from tms_agents.floor.left_feet import take_back
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import OBJECT, Objects
 from tms_agents.floor.own_feet import exchange
-from tms_agents.floor.patience import has_left
+from tms_agents.floor.patience import brings, has_left
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
@@ -185,7 +185,8 @@ class FloorEstimator:
         x, y = float(q["x"]), float(q["y"])
         if self._masks.outside(x, y) or (kind == OBJECT and self._objects.at(q)):
             return []
-        waits_s = _WAITS_S if q["busy"] < q["rested"] else _STOPS_S
+        brought = q["busy"] >= q["rested"] or brings(q, self._tracks.bodies)
+        waits_s = _STOPS_S if brought else _WAITS_S
         waits = kind == OBJECT and not q["given"] and t - q["first"] < waits_s and self._gates.distance(x, y) == 0.0
         if waits and not has_left(q, self._tracks.bodies):
             return []

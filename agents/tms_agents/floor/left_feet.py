@@ -30,8 +30,8 @@ _FOOT_M, _BEAMS = 0.1, 8
 #: One print is his if it is as bright as his feet, and what walks with his name is so much less (difference of squared
 #: standard deviations, twice the log likelihood ratio).
 _TELLS = 5.0
-#: He stays there for so long (s): the passer is still beside him.
-_HELD_S = 3.0
+#: Who had stood there for so long (s) stays for so long (s): the passer is still beside him.
+_ROOTED_S, _HELD_S = 10.0, 3.0
 
 
 @njit(cache=True)
@@ -129,7 +129,8 @@ def _stand(body: Any, prints: Any, i: int, j: int, t: float) -> None:
         body.b_seen = body.b_since = body.b_stood = p.rested
     body.x, body.y, body.vx, body.vy = 0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.0, 0.0
     body.pp, body.pv, body.vv = 0.01, 0.0, 0.1
-    body.seen, body.clear, body.lone, body.held = t, 0.0, 0.0, t + _HELD_S
+    body.seen, body.clear, body.lone = t, 0.0, 0.0
+    body.held = t + _HELD_S if t - p.rested > _ROOTED_S else -1e9
 
 
 _SCRATCH = np.zeros(1, CLUSTER)

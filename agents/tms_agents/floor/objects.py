@@ -251,7 +251,9 @@ def _ripe(
         his = q.owned - q.first > _HIS_S
         gone_s, spare_s = (_LEFT_S, _LEFT_S) if his else (alone_s, _SPARE_S)
         alone = t - q.busy > gone_s or broad
-        given = q.given == 1 and age > (_PART_S if robots else 1.25 * rest_s)
+        # What is mostly seen whole is no part of a robot.
+        part = robots and 2 * q.whole < q.hits
+        given = q.given == 1 and age > (_PART_S if part else 1.25 * rest_s)
         nobodys = alone or given or astride or q.spare >= spare_s
         if not nobodys and (t - q.owned < gone_s or not _third(q, bodies, t, rest_s)):
             continue

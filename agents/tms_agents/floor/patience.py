@@ -26,6 +26,8 @@ _HIS_S, _STILL_S = 20.0, 30.0
 _JOINED, _JOINED_S = 0.3, 25.0
 #: Whose foot it was has gone if both his feet were seen (within s) so far away (m); nobody is near who is not nearer.
 _SEEN_S, _FAR_M = 0.5, 0.9
+#: Who began to be seen so shortly (s) before or after something came to rest, and so near (m), may have brought it.
+_BRINGS_S, _BRINGS_M = 3.0, 1.0
 
 
 @njit(cache=True)
@@ -67,6 +69,17 @@ def _somebody_near(q: Any, bodies: Any) -> bool:
         body = bodies[b]
         near = near or (body.used and not body.robot and norm(body.x - q.x, body.y - q.y) < _FAR_M)
     return near
+
+
+@njit(cache=True)
+def brings(q: Any, bodies: Any) -> bool:
+    """Whether somebody began to be seen beside the print when it came to rest: he may have brought it in."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        came = body.used and body.confirmed and not body.robot and abs(body.first - q.rested) < _BRINGS_S
+        if came and norm(body.x0 - q.x, body.y0 - q.y) < _BRINGS_M:
+            return True
+    return False
 
 
 @njit(cache=True)

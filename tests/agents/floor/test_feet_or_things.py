@@ -12,6 +12,7 @@ from tms_agents.floor import Appeared, FloorSettings, Scene
 from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.nobodys import costs, known, nobodys
 from tms_agents.floor.objects import FURNITURE, OBJECT, Objects
+from tms_agents.floor.patience import brings
 from tms_agents.floor.prints import attend
 from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.segmentation import CLUSTER
@@ -79,6 +80,31 @@ def test_it_waits_for_longer_where_somebody_stood_on_it() -> None:
 def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
     assert not told(resting(8.0, covered=81), robots=True)
     assert told(resting(8.0, covered=81, given=1), robots=True)
+
+
+@pytest.mark.parametrize(("whole", "known"), [(20, True), (5, False)])
+def test_what_a_hand_put_in_full_view_is_no_part_of_a_robot(whole: int, known: bool) -> None:
+    """It is told before somebody, or the robot, stands before it."""
+    assert told(resting(2.0, busy=NOW, given=1, whole=whole), robots=True) == known
+
+
+@pytest.mark.parametrize(
+    ("fields", "known"),
+    [
+        ({}, True),
+        ({"first": NOW - 20.0}, False),  # he was there long before it
+        ({"x0": 1.5}, False),  # he began somewhere else
+        ({"confirmed": 0}, False),
+        ({"robot": 1}, False),
+    ],
+)
+def test_who_began_beside_what_came_to_rest_may_have_brought_it_in(fields: dict[str, float], known: bool) -> None:
+    bodies = empty(BODY, 1)
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["first"], bodies["x0"] = NOW - 9.0, 0.5
+    for name, value in fields.items():
+        bodies[name] = value
+    assert brings(resting(10.0)[0], bodies) == known
 
 
 @pytest.mark.parametrize(("apart", "released"), [(0.3, 0), (0.4, 1)])

@@ -55,11 +55,19 @@ def test_who_leaves_both_feet_behind_stands_on_them_and_who_walks_is_somebody_ne
     assert take_back(bodies, prints, NOW, expected()) == 0  # once is enough
 
 
-@pytest.mark.parametrize(("later", "away", "may_step"), [(0.1, 0.5, False), (0.1, 0.25, True), (0.7, 0.5, True)])
+@pytest.mark.parametrize(
+    ("stood", "later", "away", "may_step"),
+    [
+        (30.0, 0.1, 0.5, False),
+        (30.0, 0.1, 0.25, True),  # no farther than feet are that stand
+        (30.0, 0.7, 0.5, True),  # no foot of his has been seen there for a while
+        (5.0, 0.1, 0.5, True),  # he had not stood there for long
+    ],
+)
 def test_who_stands_on_them_again_does_not_take_the_next_step_of_the_passer(
-    later: float, away: float, may_step: bool
+    stood: float, later: float, away: float, may_step: bool
 ) -> None:
-    bodies, prints = walks(), left()
+    bodies, prints = walks(), left(rested=NOW - stood)
     take_back(bodies, prints, NOW, expected())
     clusters, one = np.zeros(1, CLUSTER), np.full(1, 4)
     clusters["x"], clusters["y"], clusters["n"], clusters["width"], clusters["spacing"] = 2.2 + away, 2.0, 6, 0.1, 0.015
