@@ -140,7 +140,8 @@ async def running(
     """Spool and poster of an agent while it works. Cancelling the work ends it in order, without an error.
 
     At the end the agent posts that it is silent and sends what waits for at most ``drain_s`` seconds; the rest stays
-    in the spool. ``heartbeat_s`` None is for recordings: no heartbeat, and the end has the time of the last entry.
+    in the spool. Cancelled again meanwhile, it sends no more. ``heartbeat_s`` None is for recordings: no heartbeat, and
+    the end has the time of the last entry.
     ``clock`` gives Unix time.
 
     Raises:
@@ -165,7 +166,8 @@ async def running(
                         yield run
             ended = run.newest if heartbeat_s is None and run.newest else run.now()
             with contextlib.suppress(SpoolFull):
-                await poster.post(AgentState(seq=0, observed_at=ended, state="silent", why="the agent ended"))
+                last = AgentState(seq=0, observed_at=ended, state="silent", why="the agent ended")
+                await _whole(poster.post(last))
             with contextlib.suppress(asyncio.CancelledError):
                 await poster.drain(drain_s)
             posted.trouble = str(poster.trouble or "")
@@ -219,6 +221,15 @@ async def until_signalled(work: Coroutine[Any, Any, T]) -> T:
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.remove_signal_handler(number)
+
+
+async def _whole(work: Coroutine[Any, Any, T]) -> T:
+    """Run to the end, also where that is cancelled."""
+    task = asyncio.ensure_future(work)
+    while not task.done():
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.shield(task)
+    return task.result()
 
 
 @contextlib.asynccontextmanager

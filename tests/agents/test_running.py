@@ -99,6 +99,29 @@ async def test_cancelling_ends_in_order_and_keeps_what_was_not_sent(tmp_path):
     assert len(bodies) == posted.waiting >= 5  # with heartbeats in between
 
 
+@pytest.mark.parametrize("turns", [1, 2, 3, 5, 8])
+async def test_who_is_told_twice_to_end_still_says_that_he_ends(tmp_path, turns):
+    """The second time may come at any moment of the end."""
+    ready = asyncio.Event()
+
+    async def work() -> None:
+        async with running(config(tmp_path), drain_s=0.2, heartbeat_s=60.0) as agent:
+            await agent.device("reader", NOW, DeviceState("connected", "here"))
+            ready.set()
+            await asyncio.Event().wait()
+
+    task = asyncio.create_task(work())
+    await ready.wait()
+    task.cancel()
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    task.cancel()
+    await task
+    with Spool(tmp_path / "spool", "a") as spool:
+        spool.continue_at(0)
+        assert ['"silent"' in item.body for item in spool.peek(100)] == [False, True]
+
+
 async def test_a_full_spool_is_counted_and_said_once(tmp_path, caplog):
     posted = Posted()
     async with running(config(tmp_path, max_items=1), drain_s=0, posted=posted) as agent:

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 from tms_agents.simulation.room import FLOOR_AGENT, MAPPER_AGENT, ROBOT_AGENT
@@ -51,7 +51,7 @@ def running_agents(configs: Mapping[str, Path], url: str, key: str | None) -> It
         environment["TMS_KEY"] = key
     processes: dict[str, subprocess.Popen[bytes]] = {}
     logs = {name: config.with_suffix(".log") for name, config in configs.items()}
-    with ExitStack() as stack:
+    try:
         for name, config in configs.items():
             with logs[name].open("wb") as log:
                 processes[name] = subprocess.Popen(
@@ -62,9 +62,6 @@ def running_agents(configs: Mapping[str, Path], url: str, key: str | None) -> It
                     env=environment,
                     start_new_session=True,  # Ctrl-C is ours to handle
                 )
-            stack.callback(stop, processes[name])
-        try:
-            yield Agents(processes, logs)
-        finally:
-            for process in processes.values():  # all at once, then wait for each
-                process.terminate()
+        yield Agents(processes, logs)
+    finally:
+        stop(*processes.values())

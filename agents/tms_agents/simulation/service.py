@@ -107,14 +107,20 @@ def _follow(stream: IO[str]) -> queue.Queue[str | None]:
     return lines
 
 
-def stop(process: subprocess.Popen[Any]) -> None:
-    """End a process in order, by force where it does not listen."""
-    if process.poll() is None:
+def stop(*processes: subprocess.Popen[Any]) -> None:
+    """End processes in order, all at once, by force where one does not listen.
+
+    Each is told once: told again, an agent hurries, and what it says at its end may not get to the server.
+    """
+    running = [process for process in processes if process.poll() is None]
+    for process in running:
         process.terminate()
-        try:
+    try:
+        for process in running:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(_ORDER_S)
-        finally:  # it hangs, or Ctrl-C came again: no server is left behind
+    finally:  # one hangs, or Ctrl-C came again: none is left behind
+        for process in running:
             if process.poll() is None:
                 process.kill()
                 process.wait()
