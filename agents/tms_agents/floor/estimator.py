@@ -45,7 +45,7 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 12: robots' footprints.
+#: Of saved states; 13: when a body was last in doubt, and until when it is held.
 _FORMAT = 13
 
 
