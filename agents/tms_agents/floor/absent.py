@@ -12,6 +12,7 @@ from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
 from tms_agents.floor.patience import has_left
+from tms_agents.floor.prints import thin
 from tms_agents.floor.state import BODY, CONCEALED, empty, pack, unpack
 
 Array = NDArray[np.float64]
@@ -106,10 +107,14 @@ class Absent:
 
         Not if it was taken for a foot of one of the ``bodies`` (n,), who has left it.
         """
-        return not has_left(print_, bodies) and any(
-            print_["rested"] > one["seen"] - _JUST_S
-            and math.hypot(print_["x"] - one["x"], print_["y"] - one["y"]) < _STEPS_M
-            for one in self._bodies
+        return (
+            not has_left(print_, bodies)
+            and not thin(print_)
+            and any(
+                print_["rested"] > one["seen"] - _JUST_S
+                and math.hypot(print_["x"] - one["x"], print_["y"] - one["y"]) < _STEPS_M
+                for one in self._bodies
+            )
         )
 
     def gone(self, t: float) -> list[FloorEvent]:

@@ -217,6 +217,7 @@ def _ripe(
     t: float,
     rest_s: float,
     alone_s: float,
+    absorb_s: float,
     width_m: float,
     scattered: Array,
     ripe: NDArray[np.int64],
@@ -263,7 +264,7 @@ def _ripe(
             told = astride or t - q.rested >= patience(q, bodies, t, scattered)
             ripe[j] = OBJECT if told else WAITS
             count += 1
-        elif alone and age > 2.0:
+        elif alone and age > absorb_s:
             ripe[j] = FURNITURE
             count += 1
     return count
@@ -328,6 +329,7 @@ class Objects:
             t,
             s.rest_s,
             s.alone_s,
+            s.absorb_s,
             s.object_width_m,
             scattered,
             self._ripe,

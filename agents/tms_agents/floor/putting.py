@@ -34,12 +34,12 @@ _SPECK_M, _EDGE_M = 0.09, 0.03
 
 
 @njit(cache=True)
-def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
-    """Whether the cluster with the new print lies there because one of the bodies (n,) has put it there."""
+def _put(c: Any, j: int, prints: Any, bodies: Any, t: float) -> bool:
+    """Whether the cluster with the new print j lies there because one of the bodies (n,) has put it there."""
     giver = -1
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or (body.stale and t - body.seen > 10.0):
+        if not body.used or (body.stale and t - body.seen > 10.0) or _is_he(body, j):
             continue
         away = norm(c.x - body.x, c.y - body.y)
         stands = (
@@ -52,14 +52,22 @@ def _put(c: Any, print_: Any, prints: Any, bodies: Any, t: float) -> bool:
             and prints[body.b_print].last == t
             and t - max(prints[body.a_print].first, prints[body.b_print].first) > _STANDS_S
         )
-        if stands and away < _REACH_M:
+        if stands:
             near = min(norm(c.x - body.ax, c.y - body.ay), norm(c.x - body.bx, c.y - body.by))
-            if away < _STEP_M or near < _BESIDE_M + 0.5 * print_.width:
+            if away < _STEP_M or near < _BESIDE_M + 0.5 * prints[j].width:
                 return False
-            giver = b
+            # Who stands farther off has not put it there, but not stepped there either.
+            if away < _REACH_M:
+                giver = b
         elif away < _OTHER_M:
             return False
     return giver >= 0
+
+
+@njit(cache=True)
+def _is_he(body: Any, j: int) -> bool:
+    """Whether the body is somebody new who began with the print j and is nothing else: he tells nothing of it."""
+    return bool(not body.confirmed and body.a_print == j and body.b_print < 0)
 
 
 @njit(cache=True)
@@ -78,7 +86,7 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
         for b in range(bodies.size):
             body = bodies[b]
             away = norm(body.x - q.x, body.y - q.y)
-            if not body.used or away > _OTHER_M or (body.stale and t - body.seen > 10.0):
+            if not body.used or away > _OTHER_M or (body.stale and t - body.seen > 10.0) or _is_he(body, j):
                 continue
             apart = norm(body.ax - body.bx, body.ay - body.by)
             near = min(norm(body.ax - q.x, body.ay - q.y), norm(body.bx - q.x, body.by - q.y))
@@ -131,7 +139,7 @@ def _set_aside(
             if q.hits == 1:
                 q.given = 0
             new = t - q.first <= _NEW_S and q.owner < 0 and q.hits < 3 and clusters[k].width < width_m
-            if new and not q.given and _put(clusters[k], q, prints, bodies, t):
+            if new and not q.given and _put(clusters[k], of[k], prints, bodies, t):
                 q.given = 1
             thing = q.given == 1
         if not thing:

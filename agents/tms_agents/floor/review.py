@@ -13,7 +13,7 @@ from tms_agents.floor.build import LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
 from tms_agents.floor.masks import distance
 from tms_agents.floor.norm import norm
-from tms_agents.floor.prints import ALONE
+from tms_agents.floor.prints import ALONE, UNLIKE
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,9 @@ _STILL_S, _SHOD_S = 900.0, 60.0
 _CAME_M, _CAME_BOTH = 0.5, 10
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
+#: Two feet seen (within s) so near each other (m) are one thing, of which now this part is met, now that; legs that are
+#: one thing to the laser are wider than one.
+_BOTH_SEEN_S, _ONE_M = 1.0, 0.08
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
 _STOOD_S = 20.0
 #: What was pushed stands still for so long (s): it is furniture.
@@ -87,6 +90,8 @@ def _is_lone(body: Any, t: float) -> bool:
         return False
     apart = norm(body.ax - body.bx, body.ay - body.by)
     a, b = t - body.a_seen, t - body.b_seen
+    if max(a, b) < _BOTH_SEEN_S and apart < _ONE_M and body.odd != UNLIKE:
+        return True
     since = body.a_since if a < b else body.b_since
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land

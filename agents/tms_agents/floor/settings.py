@@ -70,7 +70,7 @@ class FloorSettings:
     confirm_m: float = 0.25
     #: A mover that should be seen and is not has left after this time.
     leave_s: float = 1.5
-    #: A mover hidden behind something is kept for so long (on a seat: without limit).
+    #: A mover hidden behind something is kept for so long (on a seat: a day).
     hidden_s: float = 60.0
     #: A mover is stale when it has not been seen for so long.
     stale_s: float = 1.0

@@ -131,6 +131,18 @@ def test_what_came_where_somebody_was_lost_may_be_his_foot(
     assert absent.stands(print_, empty(BODY, 1)) == stands
 
 
+@pytest.mark.parametrize(("width", "whole", "stands"), [(0.1, 30, True), (0.05, 30, False), (0.05, 5, True)])
+def test_what_is_thinner_than_a_foot_is_none_of_who_was_lost(
+    absent: Absent, width: float, whole: int, stands: bool
+) -> None:
+    """If all of it is seen."""
+    absent.keep(person(4.0, 4.0))
+    (print_,) = empty(PRINT, 1)
+    print_["x"], print_["y"], print_["rested"] = 4.5, 4.0, 12.0
+    print_["width"], print_["hits"], print_["whole"] = width, 30, whole
+    assert absent.stands(print_, empty(BODY, 1)) == stands
+
+
 @pytest.mark.parametrize(("whose", "both_seen", "may_stand"), [(5, True, False), (6, True, True), (5, False, True)])
 def test_what_somebody_else_stood_on_and_has_left_is_no_foot_of_who_was_lost(
     absent: Absent, whose: int, both_seen: bool, may_stand: bool

@@ -77,6 +77,13 @@ def test_it_waits_for_longer_where_somebody_stood_on_it() -> None:
     assert told(resting(30.0, width=0.22, owned=NOW - 12.0, busy=NOW - 12.0))
 
 
+@pytest.mark.parametrize(("absorb_s", "furniture"), [(2.0, True), (8.0, False)])
+def test_how_long_what_is_wide_rests_until_it_is_furniture_is_a_setting(absorb_s: float, furniture: bool) -> None:
+    objects = Objects(empty(THING, 1), FloorSettings(absorb_s=absorb_s))
+    found = objects.ripe(resting(5.0, width=0.3), empty(BODY, 1), NOW, expected())
+    assert found == ([(0, FURNITURE)] if furniture else [])
+
+
 def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
     assert not told(resting(8.0, covered=81), robots=True)
     assert told(resting(8.0, covered=81, given=1), robots=True)
@@ -156,6 +163,47 @@ def test_what_flickers_at_the_edge_of_a_thing_is_no_foot(width: float, idle: flo
     prints["x"][1] = clusters["x"] = off
     clusters["width"], clusters["n"], clusters["cut"] = width, 2, 1
     assert set_aside(clusters, np.ones(1, np.int64), prints, empty(BODY, 1), 0.3, NOW) == foot
+
+
+def crowd(**other: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bodies: who stands on both feet 0.35 m from something new, and somebody else; prints, the new one last."""
+    prints = np.concatenate([*(resting(2.0) for _ in range(4)), resting(0.0)])
+    bodies = empty(BODY, 2)
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["x"], bodies["a_print"], bodies["b_print"] = [0.35, -0.9], [0, 2], [1, 3]
+    bodies["a_seen"] = bodies["b_seen"] = bodies["seen"] = NOW
+    bodies["ax"] = bodies["bx"] = bodies["x"]
+    bodies["ay"], bodies["by"] = 0.1, -0.1
+    for name, value in other.items():
+        bodies[name][1] = value
+    return bodies, prints
+
+
+@pytest.mark.parametrize(
+    ("other", "given"),
+    [
+        ({}, 1),  # who stands on two feet out of reach has not put it there, and not stepped there
+        ({"b_print": 2}, 0),  # who shows one foot alone may have stepped there
+        ({"confirmed": 0, "x": 0.0, "a_print": 4, "b_print": -1}, 1),  # it was taken for somebody new, and nothing else
+        ({"confirmed": 0, "x": 0.0, "a_print": 4, "b_print": 3}, 0),
+    ],
+)
+def test_what_appears_beside_who_stands_on_both_feet_was_put_there(other: dict[str, float], given: int) -> None:
+    bodies, prints = crowd(**other)
+    prints["owner"][:4] = 0
+    clusters = np.zeros(1, CLUSTER)
+    clusters["width"], clusters["n"] = 0.1, 8
+    set_aside(clusters, np.full(1, 4, np.int64), prints, bodies, 0.3, NOW)
+    assert prints["given"][4] == given
+
+
+@pytest.mark.parametrize(("b_print", "counted"), [(-1, 1.0), (3, 0.0)])
+def test_somebody_new_who_is_only_what_lies_there_is_no_reason_to_wait(b_print: int, counted: float) -> None:
+    bodies, prints = crowd(confirmed=0, x=0.0, a_print=4, b_print=b_print)
+    prints["owner"][:4] = 0
+    prints["first"][4] = NOW - 1.0
+    count_feet(prints, bodies, NOW, 1.0)
+    assert prints["spare"][4] == pytest.approx(counted)
 
 
 @pytest.mark.parametrize(("away", "may_step"), [(0.7, True), (1.6, False)])

@@ -194,6 +194,28 @@ def test_who_would_stand_on_one_shoe_is_somewhere_else(odd: int, lost: bool) -> 
     assert (LOST in found(bodies, 8.0, COVERED)) == lost
 
 
+@pytest.mark.parametrize(
+    ("apart", "odd", "lost"),
+    [
+        (0.06, 0, True),
+        (0.12, 0, False),
+        (0.06, UNLIKE, False),  # as wide as both legs
+    ],
+)
+def test_two_feet_at_one_place_are_one_thing(apart: float, odd: int, lost: bool) -> None:
+    """Now this part of a box is met, now that, and each is taken for a foot."""
+    bodies = standing(2.0, 2.0 + apart)
+    bodies["odd"] = odd
+    actions = np.zeros(1, np.int64)
+    said = []
+    for k in range(60):
+        bodies["seen"] = t = NOW + 0.1 * k
+        bodies["a_seen" if k % 2 else "b_seen"] = t
+        review(bodies, t, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+        said.append(int(actions[0]))
+    assert (LOST in said) == lost
+
+
 @pytest.mark.parametrize(("stood", "lost"), [(60.0, False), (5.0, True)])
 def test_who_has_stood_for_long_has_not_stepped_to_where_somebody_passes(stood: float, lost: bool) -> None:
     """His other foot, behind the first, seems to be half a metre away for a moment."""
