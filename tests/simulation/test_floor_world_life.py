@@ -143,6 +143,18 @@ def test_nobody_acts_from_afar_or_vanishes_in_the_room_though_others_are_in_his_
         assert not any(life.plan.contains(there[gone], -0.01) for gone in there.keys() - life.movers.keys())
 
 
+@pytest.mark.parametrize(("name", "seed"), [("robots", 1469), ("hidden", 1304)])
+def test_nobody_stands_on_what_lies_there(name: str, seed: int) -> None:
+    world = FloorWorld(name, seed)
+    life = world.life
+    while life.now < world.duration:
+        life.advance(life.now + 0.1)
+        for mover in life.movers.values():
+            for thing in life.room.things.values():
+                on_it = math.dist(mover.xy, thing.pose[:2]) < 0.5 * thing.size + 0.05
+                assert mover.walker is None or mover.walker.lifted or not on_it
+
+
 def test_who_meets_a_robot_in_the_door_lets_it_pass() -> None:
     world = FloorWorld("robots", 2194, laser=LASERS["coarse"])
     inside = set()

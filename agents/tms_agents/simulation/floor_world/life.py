@@ -21,6 +21,8 @@ from tms_agents.simulation.floor_world.tasks import Drag, Story
 
 #: Seconds; feet and bodies move on in steps of this.
 STEP_S = 0.025
+#: Half as wide (m) is who walks, and who squeezes through; feet keep off things by the first in any case.
+_BODY_M, _TIGHT_M = 0.24, 0.16
 
 
 @dataclass(slots=True)
@@ -163,11 +165,11 @@ class Life:
 
     def ways(self, mover: Mover) -> Ways:
         """For a body like this one."""
-        return self._ways_of(0.24 if mover.size is None else mover.radius + 0.03)
+        return self._ways_of(_BODY_M if mover.size is None else mover.radius + 0.03)
 
     def tight_ways(self) -> Ways:
-        """Where a person can squeeze through."""
-        return self._ways_of(0.16)
+        """Where a person can squeeze through, without a foot on anything that lies there."""
+        return self._ways_of(_TIGHT_M)
 
     def clear_way(self, who: Mover, furniture: str, to: Pose) -> list[Xy]:
         """Corners of a way for a piece of furniture past everything and everybody; empty where there is none."""
@@ -187,7 +189,7 @@ class Life:
 
     def random_place(self, margin: float = 0.3, ways: Ways | None = None) -> Xy:
         """Somewhere in the room where a person can stand."""
-        ways = ways or self._ways_of(0.24)
+        ways = ways or self._ways_of(_BODY_M)
         while True:
             xy = (self.rng.uniform(0, self.plan.width), self.rng.uniform(0, self.plan.depth))
             if self.plan.contains(xy, margin) and ways.is_free(xy):
@@ -229,6 +231,7 @@ class Life:
         radius = round(radius, 2)
         if radius not in self._ways:
             blocked = [piece for piece in self.room.furniture.values() if not piece.id.startswith("door")]
-            things = [(thing.pose[:2], thing.size) for thing in self.room.things.values()]
+            wider = 2 * max(0.0, _BODY_M - radius)
+            things = [(thing.pose[:2], thing.size + wider) for thing in self.room.things.values()]
             self._ways[radius] = Ways(self.plan, blocked, things, radius)
         return self._ways[radius]

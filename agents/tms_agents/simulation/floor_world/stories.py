@@ -15,8 +15,9 @@ from tms_agents.simulation.floor_world.room import Thing
 from tms_agents.simulation.floor_world.shapes import Material, Pose, Xy
 from tms_agents.simulation.floor_world.tasks import Do, Drag, Face, Go, Sit, Story, Task, Wait
 
-#: Who was kept from where he would go tries again, so often at most; so near (m) he is there, and so far he reaches.
-_TRIES, _THERE_M, _REACH_M = 4, 0.3, 0.75
+#: Who was kept from where he would go tries again, so often at most; so near (m) he is there. What he puts down or
+#: takes is within reach, and he does not stand on it.
+_TRIES, _THERE_M, _BESIDE_M, _REACH_M = 4, 0.3, 0.3, 0.75
 
 
 def wander(life: Life, me: Mover, until: float, pause: float = 0.4) -> Story:
@@ -175,7 +176,7 @@ def _stand_before(life: Life, me: Mover, xy: Xy) -> Generator[Task, None, bool]:
         yield Go(spot)
         yield Face(xy)
         yield Wait(me.rng.uniform(0.6, 1.4))
-        if math.dist(me.xy, xy) < _REACH_M:
+        if _BESIDE_M < math.dist(me.xy, xy) < _REACH_M:
             return True
     return False
 
