@@ -13,7 +13,7 @@ from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
 from tms_agents.floor.patience import has_left
 from tms_agents.floor.prints import thin
-from tms_agents.floor.state import BODY, CONCEALED, empty, pack, unpack
+from tms_agents.floor.state import BODY, CONCEALED, SEATED, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ _AWAY_M, _SPEED, _WAIT_S = 1.0, 1.0, 20.0
 #: Who was seen last so far (m) on this side of the threshold may have turned round; then he is seen again within this
 #: (s), and believed so long (s) after that at most.
 _THRESHOLD_M, _TURNS_S, _BELIEVED_S = 0.25, 6.0, 1.5
+#: Who seemed to sit down so lately (s) may have gone on.
+_PASSES_S = 6.0
 #: So near (m) where he was lost he may stand, since so long (s) before that at most.
 _STEPS_M, _JUST_S = 1.2, 4.0
 #: Who looks and walks as unlikely as this (log likelihood) is somebody else.
@@ -82,25 +84,36 @@ class Absent:
 
     def find(self, body: Any, scattered: Array) -> Any:
         """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `alike` takes."""
-        if body["wide"] > 0.3:
+        for lost, within_s in ((self._turning, _TURNS_S), (self._bodies if self._inside(body) else [], _WAIT_S)):
+            index = self._likeliest(lost, body, scattered, within_s)
+            if index is not None:
+                return lost.pop(index)
+        return None
+
+    def rises(self, bodies: Any, body: Any, scattered: Array) -> int | None:
+        """Which of the ``bodies`` (n,), who seemed to sit down, is this new one: he went on where nobody saw it."""
+        if not self._inside(body):
             return None
-        found = self._nearest(self._turning, body, scattered, _TURNS_S)
-        if found is None and self._gates.distance(float(body["x0"]), float(body["y0"])) >= _DOOR_M:
-            found = self._nearest(self._bodies, body, scattered, _WAIT_S)
-        return found
+        seated = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == SEATED))
+        index = self._likeliest([bodies[i] for i in seated], body, scattered, _PASSES_S)
+        return None if index is None else int(seated[index])
+
+    def _inside(self, body: Any) -> bool:
+        """Whether the new one began too far from the doors, where they are known, to have come in."""
+        return _DOOR_M <= self._gates.distance(float(body["x0"]), float(body["y0"])) < math.inf
 
     @staticmethod
-    def _nearest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> Any:
-        """Take out of those ``lost`` the one that the body most probably is, or None."""
+    def _likeliest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> int | None:
+        """Which of those ``lost``, this long ago at most, the body most probably is, or None."""
         best, best_cost = None, 1.0
-        for index, one in enumerate(lost):
+        for index, one in enumerate(lost if body["wide"] <= 0.3 else []):
             since = max(0.0, float(body["first"]) - float(one["seen"]))
             gap = math.hypot(body["x0"] - one["x"], body["y0"] - one["y"]) / (_AWAY_M + _SPEED * since)
             likely = float(alike(body, one, scattered))
             cost = 0.5 * gap + 0.5 * likely / _UNLIKE
             if since < within_s and gap < 1.0 and likely > _UNLIKE and cost < best_cost:
                 best, best_cost = index, cost
-        return None if best is None else lost.pop(best)
+        return best
 
     def stands(self, print_: Any, bodies: Any) -> bool:
         """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost.

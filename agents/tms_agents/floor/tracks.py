@@ -277,6 +277,8 @@ class Tracks:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
         missing = self._missing(body)
+        if missing is None and not is_footless(body):
+            missing = self.absent.rises(self.bodies, body, self._association.scattered)
         old = None
         if missing is not None:
             self._association.decide(missing)

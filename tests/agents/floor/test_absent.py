@@ -10,7 +10,7 @@ from tms_agents.floor.absent import Absent
 from tms_agents.floor.events import Vanished
 from tms_agents.floor.masks import Area
 from tms_agents.floor.shine import expected
-from tms_agents.floor.state import BODY, PRINT, empty
+from tms_agents.floor.state import BODY, CONCEALED, PRINT, SEATED, empty
 
 ROOM = [(0.0, -2.0), (9.0, -2.0), (9.0, 6.0), (0.0, 6.0)]
 DOOR = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
@@ -88,6 +88,35 @@ def test_who_is_too_far_away_or_looks_otherwise_is_somebody_else(absent: Absent)
     assert absent.find(person(9.0, 4.0, first=11.0), expected()) is None
     assert absent.find(person(4.5, 4.0, first=11.0, own=6.0), expected()) is None
     assert absent.find(person(4.5, 4.0, first=11.0), expected()) is not None
+
+
+@pytest.mark.parametrize(
+    ("fields", "same"),
+    [
+        ({}, True),
+        ({"first": 17.0}, False),  # by then he sits
+        ({"x0": 0.8, "y0": 0.0}, False),  # at the door
+        ({"own": 6.0, "look": 6.0}, False),
+        ({"wide": 0.5}, False),
+    ],
+)
+def test_who_only_passed_the_bed_out_of_sight_keeps_his_name(
+    absent: Absent, fields: dict[str, float], same: bool
+) -> None:
+    bodies = empty(BODY, 3)
+    bodies[1], bodies[2] = person(4.0, 4.0, label=3), person(5.0, 4.0, label=4)
+    bodies["stale"] = 0, SEATED, CONCEALED
+    new = person(6.0, 4.0, first=13.0)
+    for name, value in fields.items():
+        new[name] = value
+    assert absent.rises(bodies, new, expected()) == (1 if same else None)
+
+
+def test_without_doors_who_sits_stays_where_he_is() -> None:
+    bodies = empty(BODY, 1)
+    bodies[0] = person(4.0, 4.0)
+    bodies["stale"] = SEATED
+    assert Absent(Area([]), Area([ROOM])).rises(bodies, person(5.0, 4.0, first=12.0), expected()) is None
 
 
 def test_of_two_the_one_who_looks_like_it(absent: Absent) -> None:
