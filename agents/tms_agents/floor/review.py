@@ -36,8 +36,8 @@ _STILL_S, _SHOD_S = 900.0, 60.0
 _CAME_M, _CAME_BOTH = 0.5, 10
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
-#: Two feet seen (within s) so near each other (m) are one thing, of which now this part is met, now that. Not what is as
-#: no leg of his: it may be both (and is asked below, later).
+#: Two feet seen (within s) so near each other (m) are one thing, of which now this part is met, now that. Not what is
+#: as wide as no leg of his: it may be both.
 _BOTH_SEEN_S, _ONE_M = 1.0, 0.08
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
 _STOOD_S = 20.0
