@@ -16,6 +16,7 @@ from tms_agents.simulation.floor_world.gait import Build, Walker
 from tms_agents.simulation.floor_world.plan import Door, Plan, Ways
 from tms_agents.simulation.floor_world.room import Furniture
 from tms_agents.simulation.floor_world.shapes import Drawing
+from tms_agents.simulation.floor_world.stories import new_thing
 
 
 @cache
@@ -170,6 +171,13 @@ def test_things_are_hidden_for_longer_than_a_minute_and_one_is_taken_meanwhile()
     assert max(end - begin for span in spans for begin, end in span["occluded"]) > 60
     taken = [span for span in spans if span["t_picked"]]
     assert any(span["first_clear"] is None or span["first_clear"] > span["t_picked"] + 3 for span in taken)
+
+
+def test_what_finds_no_place_at_a_wall_lies_on_the_open_floor(monkeypatch: pytest.MonkeyPatch) -> None:
+    life = FloorWorld("near wall", 1501).life
+    monkeypatch.setattr("tms_agents.simulation.floor_world.stories._by_the_wall", lambda life, size: None)
+    thing = new_thing(life, 0.08, "o1", where="wall")
+    assert life.plan.contains(thing.pose[:2], 0.3)
 
 
 def test_things_near_a_wall_are_less_than_10_cm_before_it() -> None:

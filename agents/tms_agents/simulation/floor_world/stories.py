@@ -126,7 +126,10 @@ def new_thing(
     near: Xy | None = None,
     laser: str | None = None,
 ) -> Thing:
-    """A thing at a place that a laser can see now: on the open floor, or less than 10 cm before a wall."""
+    """A thing at a place that a laser can see now: on the open floor, or less than 10 cm before a wall.
+
+    On the open floor, too, where no wall has such a place. Raises RuntimeError where there is none at all.
+    """
     shape: Literal["disc", "box"] = "disc" if life.rng.random() < 0.5 or size < 0.05 else "box"
     for attempt in range(4000):
         xy = _by_the_wall(life, size) if where == "wall" else life.random_place(0.35)
@@ -139,7 +142,9 @@ def new_thing(
             thing = Thing(id=name, size=size, shape=shape, pose=pose, material=material or _plain(life.rng))
             if would_see(life, thing, laser):
                 return thing
-    raise RuntimeError(f"no place for {name} in {4000} attempts")
+    if where == "wall":
+        return new_thing(life, size, name, material, "open", near, laser)
+    raise RuntimeError(f"no place for {name} in 4000 attempts")
 
 
 def would_see(life: Life, thing: Thing, laser: str | None = None) -> bool:
