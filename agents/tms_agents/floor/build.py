@@ -27,7 +27,7 @@ _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 #: So many stances tell somebody's beat of late, and his own.
 _PACE_MEMORY, _PACE_LIFE = 12, 80
 #: So many sightings tell how wide somebody's legs are of late, how long his shoes, and both of who has the name.
-_LEGS_MEMORY, _SHOES_MEMORY, _SIZE_LIFE = 300, 15, 1000
+_LEGS_MEMORY, _SHOES_MEMORY, _SIZE_LIFE = 100, 15, 1000
 #: So many sightings of legs, or of shoes from the side, tell how wide or how long they are.
 LEGS_KNOWN, SHOES_KNOWN = 40, 10
 #: How wide a cylinder looks in one sighting: standard deviations of so much (m), and of such a share of the distance of
