@@ -117,7 +117,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.shoe, body.leg, body.odd = 0.0, 0.0, 0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
-    body.girth, body.girth_n, body.own_girth, body.own_girth_n, body.own_girth_off = 0.0, 0, 0.0, 0, 1.0
+    body.girth, body.girth_n, body.own_girth, body.own_girth_n = 0.0, 0, 0.0, 0
     body.ex, body.ey, body.e_at = 0.0, 0.0, -1e9
     body.sole, body.sole_n, body.own_sole, body.own_sole_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure, body.doubted, body.held = 0.0, 0, 1.0, 0, -1e9

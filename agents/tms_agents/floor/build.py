@@ -27,12 +27,9 @@ _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 #: So many stances tell somebody's beat of late, and his own.
 _PACE_MEMORY, _PACE_LIFE = 12, 80
 #: So many sightings tell how wide somebody's legs are of late, how long his shoes, and both of who has the name.
-_LEGS_MEMORY, _SHOES_MEMORY, _SIZE_LIFE = 100, 15, 1000
+_LEGS_MEMORY, _SHOES_MEMORY, _SIZE_LIFE = 300, 15, 1000
 #: So many sightings of legs, or of shoes from the side, tell how wide or how long they are.
 LEGS_KNOWN, SHOES_KNOWN = 40, 10
-#: How wide a cylinder looks in one sighting: standard deviations of so much (m), and of such a share of the distance of
-#: two beams. How much more it is of somebody is learned from so many sightings, none farther off than so many of them.
-_SURFACE_M, _EDGES, _SCATTER_MEMORY, _FAR = 0.007, 0.55, 60.0, 6.0
 #: Whose name is less sure does not change what is known of the name.
 SURE = 0.6
 #: Where shoes are seen, at least this share of all feet that walk is as wide as one. Of simulated legs it is 0.03 at
@@ -81,27 +78,12 @@ def size_up(body: Any, c: Any) -> None:
     if c.width < _SHOE_M[0]:
         body.girth, body.girth_n = mean(body.girth, body.girth_n, c.width, _LEGS_MEMORY)
         if body.sure >= SURE:
-            if body.own_girth_n >= LEGS_KNOWN:
-                off = min((c.width - body.own_girth) ** 2 / girth_variance(c), _FAR**2)
-                body.own_girth_off += (off - body.own_girth_off) / _SCATTER_MEMORY
             body.own_girth, body.own_girth_n = mean(body.own_girth, body.own_girth_n, c.width, _SIZE_LIFE)
     elif from_side(c) and astray(body, c) < _ASTRAY:
         length = sole(c)
         body.sole, body.sole_n = mean(body.sole, body.sole_n, length, _SHOES_MEMORY)
         if body.sure >= SURE:
             body.own_sole, body.own_sole_n = mean(body.own_sole, body.own_sole_n, length, _SIZE_LIFE)
-
-
-@njit(cache=True)
-def girth_variance(c: Any) -> float:
-    """Variance (m²) of how wide a leg looks that is a cylinder: of its surface, and of the beams at both edges."""
-    return float(_SURFACE_M**2 + (_EDGES * c.spacing) ** 2)
-
-
-@njit(cache=True)
-def scatter_of_legs(body: Any) -> float:
-    """How many times the variance of cylinders that of his legs is: trousers hang, and no leg is round."""
-    return float(max(body.own_girth_off, 1.0))
 
 
 @njit(cache=True)

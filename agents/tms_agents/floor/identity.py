@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
-from tms_agents.floor.build import LEGS_KNOWN, SHOES, SHOES_KNOWN, scatter_of_legs
+from tms_agents.floor.build import LEGS_KNOWN, SHOES, SHOES_KNOWN
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ _PATCHES = 0.12
 #: more than so many deviations.
 _PACE, _PACE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
 #: Standard deviations (m) of how wide a leg looks in one sighting (a few beams, scans alike), and of late.
-_WIDTH_M, _TROUSERS_M = 0.013, 0.0025
+_WIDTH_M, _TROUSERS_M = 0.015, 0.004
 #: The same of how long a shoe looks.
 _SOLE_M, _SOLES_M = 0.012, 0.003
 #: So many sightings make a look that somebody can be known by; so many stances a beat.
@@ -53,7 +53,6 @@ def alike(body: Any, name: Any, scattered: Array) -> float:
         value -= 0.5 * min((body.pace - name.own_pace) ** 2 / variance, _FAR**2)
     if body.girth_n > 0 and name.own_girth_n >= LEGS_KNOWN and body.shoe < SHOES:
         variance = _WIDTH_M**2 * (1.0 / body.girth_n + 1.0 / name.own_girth_n) + _TROUSERS_M**2
-        variance *= scatter_of_legs(name)
         value -= 0.5 * min((body.girth - name.own_girth) ** 2 / variance, _FAR**2)
     if body.sole_n > 0 and name.own_sole_n >= SHOES_KNOWN and body.shoe >= SHOES:
         variance = _SOLE_M**2 * (1.0 / body.sole_n + 1.0 / name.own_sole_n) + _SOLES_M**2

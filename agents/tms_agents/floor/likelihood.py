@@ -17,8 +17,6 @@ from tms_agents.floor.build import (
     WALKS,
     astray,
     from_side,
-    girth_variance,
-    scatter_of_legs,
     sole,
     wears_shoes,
 )
@@ -54,12 +52,11 @@ _LATELY_S = 0.5
 _LEFT_S, _LEFT = 1.0, 0.5
 #: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
 _ROLL_M, _ROLLED_M = 0.08, 0.17
-#: A leg is so wide at most (m), and is not the other one that far (m) beyond the edge of that. Whose it is by its width
-#: counts for so much at most (twice the negative log likelihood).
-LEG_M, _BEYOND_M, _STOUTER = 0.16, 0.02, 9.0
-#: One sighting of the length of a shoe errs by so much (m), the sine of how far it points from the way by so much, and
-#: both count for so much at most: the next one errs alike.
-_SOLE_M, _TURNED, _OTHER = 0.015, 0.5, 4.0
+#: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
+#: alike.
+LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
+#: The same of the length of a shoe; the sine of how far it points from the way.
+_SOLE_M, _TURNED = 0.015, 0.5
 #: Negative log likelihood of a foot wider than a leg although the other one is elsewhere: up to as wide as two legs
 #: side by side (m), and wider; or longer than a shoe.
 _PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
@@ -110,8 +107,7 @@ def _stouter(body: Any, c: Any) -> float:
     """Negative log likelihood of a leg being so much wider or narrower than those of the one who has the name."""
     if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > LEG_M:
         return 0.0
-    variance = girth_variance(c) * scatter_of_legs(body)
-    return float(0.5 * min((c.width - body.own_girth) ** 2 / variance, _STOUTER))
+    return float(0.5 * min(((c.width - body.own_girth) / _GIRTH_M) ** 2, _OTHER))
 
 
 @njit(cache=True)
@@ -257,7 +253,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
             if swings > 0.5 and t - other < 0.22:
                 swing += _BOTH
             value = min(value, swing)
-        if broad > 0.0 and t - other < 0.2 and norm(c.x - ox, c.y - oy) > 0.5 * c.width + _BEYOND_M:
+        if broad > 0.0 and t - other < 0.2 and norm(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
             value += broad
         step = anywhere
         if body.shoe >= SHOES:

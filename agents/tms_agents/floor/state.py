@@ -61,18 +61,17 @@ PRINT = np.dtype(
 #: Of a body that is not seen (stale): it is hidden, or it has sat down.
 CONCEALED, SEATED = 1, 2
 
-#: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began,
-#: and two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What
-#: tells people apart is there three times: of the body in the last seconds (shine), of the body since it was last in
-#: doubt who it is (look, pace, girth, sole), and of the one whose name it has (own, own_pace, own_girth, own_sole;
-#: own_girth_off is how far single sightings are off, squared, in units of what is expected); sure is how likely that
-#: name is. Further: the number of its `FOOTPRINT` (0: none), for how long (s) and where it has stood on one foot
-#: alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it has
-#: stayed (rest), how wide the legs are (m, 0: unknown), whether what is seen of it is no foot, and why (odd,
-#: `prints.UNLIKE`), the line on which the shoe last seen from its side lay (ex, ey), and when (e_at), in how many
-#: scans both feet had been seen (both) when it was last found to be nowhere (doubted), and until when it stays where
-#: it was put back (held, s). Of one not believed yet: in how many scans it was seen (hits), could have been (looks),
-#: and was or should have been (due).
+#: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began, and
+#: two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
+#: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
+#: who it is (look, pace, girth, sole), and of the one whose name it has (own, own_pace, own_girth, own_sole); sure is
+#: how likely that name is. Further: the number of its `FOOTPRINT` (0: none), for how long (s) and where it has stood on
+#: one foot alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it
+#: has stayed (rest), how wide the legs are (m, 0: unknown), whether what is seen of it is no foot, and why (odd,
+#: `prints.UNLIKE`), the line on which the shoe last seen from its side lay (ex, ey), and when (e_at), in how many scans
+#: both feet had been seen (both) when it was last found to be nowhere (doubted), and until when it stays where it was
+#: put back (held, s). Of one not believed yet: in how many scans it was seen (hits), could have been (looks), and was
+#: or should have been (due).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -166,7 +165,6 @@ BODY = np.dtype(
         ("girth_n", "i8"),
         ("own_girth", "f8"),
         ("own_girth_n", "i8"),
-        ("own_girth_off", "f8"),
         ("sole", "f8"),
         ("sole_n", "i8"),
         ("own_sole", "f8"),
