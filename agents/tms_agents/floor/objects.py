@@ -14,7 +14,7 @@ from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.norm import norm
 from tms_agents.floor.own_feet import may_be_his
-from tms_agents.floor.patience import patience
+from tms_agents.floor.patience import SPARE_S, patience
 from tms_agents.floor.prints import HARDLY, lay_before
 from tms_agents.floor.settings import FloorSettings
 from tms_agents.floor.visitors import Visitors
@@ -34,8 +34,6 @@ _OVERLAP, _BESIDE_M = 0.6, 0.01
 _PARTS_M = 0.1
 #: One look is off by this at most (m).
 _TRUST_M = 0.04
-#: What is nobody's foot for so long (s), though somebody is there, is a thing.
-_SPARE_S = 2.0
 #: A foot that has stood for so long (s) is one until he has been away from it for so long (s).
 _HIS_S, _LEFT_S = 20.0, 8.0
 #: One beam is believed after so many hits; what has never been seen whole after so long (s).
@@ -250,7 +248,7 @@ def _ripe(
             continue
         # Where somebody has stood for long he may be thought to have stepped on something else.
         his = q.owned - q.first > _HIS_S
-        gone_s, spare_s = (_LEFT_S, _LEFT_S) if his else (alone_s, _SPARE_S)
+        gone_s, spare_s = (_LEFT_S, _LEFT_S) if his else (alone_s, SPARE_S)
         alone = t - q.busy > gone_s or broad
         # What is mostly seen whole is no part of a robot.
         part = robots and 2 * q.whole < q.hits

@@ -26,6 +26,9 @@ _HIS_S, _STILL_S = 20.0, 30.0
 _JOINED, _JOINED_S = 0.3, 25.0
 #: Whose foot it was has gone if both his feet were seen (within s) so far away (m); nobody is near who is not nearer.
 _SEEN_S, _FAR_M = 0.5, 0.9
+#: What is nobody's foot for so long (s), though everybody near it shows both of his elsewhere, is a thing. It may be a
+#: part of one that is moved: what is hardly ever seen whole rests for longer (s).
+SPARE_S, _PART_S = 2.0, 4.0
 #: Who began to be seen so shortly (s) before or after something came to rest, and so near (m), may have brought it.
 _BRINGS_S, _BRINGS_M = 3.0, 1.0
 
@@ -39,7 +42,8 @@ def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> f
     hardly = q.hits > HARDLY * q.whole and q.mutes < _MUTES
     if q.given:
         foot = q.width > _SIDE_M or t - q.owned < _NOW_S or _may_be_foot(q, bodies, scattered)
-        return _WATCHED_S if foot or (hardly and _somebody_near(q, bodies)) else 0.0
+        part = hardly and q.spare < _PART_S and _somebody_near(q, bodies)
+        return _WATCHED_S if foot or part else 0.0
     if q.attached > _JOINED:
         return _JOINED_S
     gone = has_left(q, bodies)

@@ -40,6 +40,8 @@ _STILL_M, _STILL = 0.008, 0.001
 NEAR_M = 0.36
 #: Seen so often, a foot is not so thin (m), a leg not so much thinner or wider than it was.
 _OFTEN, _THIN_M, _LEG = 10, 0.07, (0.65, 1.6)
+#: What was nobody's for a smaller share of the time than this had not stood there before somebody came.
+_NOBODYS = 0.1
 #: What is so far (m) beside a robot that has rested for so long (s) is no part of it, nor is what has lain still while
 #: it drove for so long (s).
 _CLEAR_M, _PARKED_S, _DRIVES_S = 0.06, 3.0, 1.0
@@ -248,7 +250,9 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
         body.older, body.odd = 0.0, 0
         j = body.a_print if body.a_seen >= body.b_seen else body.b_print
         if body.used and j >= 0:
-            body.older, body.odd = prints[j].idle, unlike_foot(body, prints[j])
+            body.odd = unlike_foot(body, prints[j])
+            if prints[j].idle > _NOBODYS * (t - prints[j].rested):
+                body.older = prints[j].idle
             alone = t - prints[j].first > _ALONE_S and t - min(body.a_seen, body.b_seen) > _ALONE_S
             if alone and strangeness(body, prints[j], scattered) > STRANGE:
                 body.odd = UNLIKE

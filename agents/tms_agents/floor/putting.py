@@ -23,6 +23,10 @@ _STEP_M, _REACH_M, _BESIDE_M = 0.3, 0.85, 0.16
 _CLOSE_M, _SLOWER = 0.08, 0.25
 #: Somebody else so near (m) may have stepped there.
 _OTHER_M = 1.0
+#: So far (m) from a robot nothing is a part of it.
+_ROBOT_M = 0.2
+#: What lay there for so long (s) before somebody was hidden, who had shown both feet so shortly (s) before, is not his.
+_LAY_S, _LAST_S = 1.0, 0.45
 #: Two feet are between these distances from each other (m).
 _FEET_M = (0.06, 0.7)
 #: A print so near (m) may be the other foot of somebody who is not known yet.
@@ -88,17 +92,10 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
             away = norm(body.x - q.x, body.y - q.y)
             if not body.used or away > _OTHER_M or (body.stale and t - body.seen > 10.0) or _is_he(body, j):
                 continue
-            apart = norm(body.ax - body.bx, body.ay - body.by)
+            if body.robot and not body.stale and away > 0.5 * (body.far + q.width) + _ROBOT_M:
+                continue
             near = min(norm(body.ax - q.x, body.ay - q.y), norm(body.bx - q.x, body.by - q.y))
-            shown = (
-                body.confirmed
-                and not body.robot
-                and not body.stale
-                and body.a_print != body.b_print
-                and t - min(body.a_seen, body.b_seen) < _NEW_S
-                and _FEET_M[0] < apart < _FEET_M[1]
-                and near > _CLOSE_M + 0.5 * q.width
-            )
+            shown = _shows_both(body, q, t) and near > _CLOSE_M + 0.5 * q.width
             close = close or near < _BESIDE_M + 0.5 * q.width
             if not shown:
                 break
@@ -111,6 +108,19 @@ def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
                     break
         if shown:
             q.spare += _SLOWER * dt if close else dt
+
+
+@njit(cache=True)
+def _shows_both(body: Any, q: Any, t: float) -> bool:
+    """Whether somebody shows both feet now, or did when he was seen last and the print already lay there."""
+    at, new = t, _NEW_S
+    if body.stale:
+        if q.first > body.seen - _LAY_S:
+            return False
+        at, new = body.seen, _LAST_S
+    apart = norm(body.ax - body.bx, body.ay - body.by)
+    person = body.confirmed and not body.robot and body.a_print != body.b_print
+    return bool(person and at - min(body.a_seen, body.b_seen) < new and _FEET_M[0] < apart < _FEET_M[1])
 
 
 @njit(cache=True)

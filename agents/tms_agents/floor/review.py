@@ -9,11 +9,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
-from tms_agents.floor.build import LONGEST_SHOE_M, SHOES, wears_shoes
+from tms_agents.floor.build import SHOES
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
+from tms_agents.floor.lone import count_lone, has_walked
 from tms_agents.floor.masks import distance
 from tms_agents.floor.norm import norm
-from tms_agents.floor.prints import ALONE, UNLIKE
 
 Array = NDArray[np.float64]
 
@@ -23,24 +23,6 @@ NOTHING, CONFIRM, LOST, BACK, GONE, MOVED, BROAD = 0, 1, 2, 3, 4, 5, 6
 _NEW_S = 30.0
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
-#: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody
-#: leaves a foot so far (m) behind, but it may have come and be hidden here: time counts less.
-_STEP_M, _STRIDE_M, _SLOWER = 0.1, 0.9, 2.0
-#: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
-#: likely a thing: time counts more.
-_OLDER_S, _FASTER = 1.0, 2.5
-#: Not even who has come step by step stands for so long (s) without shifting a foot, nor for so long with one shoe
-#: behind the other, if shoes are all that is seen.
-_STILL_S, _SHOD_S = 900.0, 60.0
-#: Who has come from so far (m), two feet of whom were seen at once so often, is somebody, too.
-_CAME_M, _CAME_BOTH = 0.5, 10
-#: Whose other foot was last seen so near (m) stands on both.
-_STANCE_M = 0.4
-#: Two feet seen (within s) so near each other (m) are one thing, of which now this part is met, now that. Not what is
-#: as wide as no leg of his: it may be both.
-_BOTH_SEEN_S, _ONE_M = 1.0, 0.08
-#: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
-_STOOD_S = 20.0
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
 #: Of whom no two feet were seen, and who rests for so long (s), is a thing.
@@ -48,8 +30,6 @@ _INERT_S = 30.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
-#: Two legs that are one thing to the laser are wider (m) than one.
-_LEGS_M = 0.2
 #: What moved with people beside it for this share of its way may have been pushed.
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
@@ -58,11 +38,6 @@ _REST_M = 0.15
 _QUALITY = 0.3
 #: Who was seen so often is somebody.
 _KNOWN = 200
-#: Who has taken so many steps, two legs of whom were seen at once so often, or two shoes, is a person: who walks has
-#: both shoes on the floor for a tenth of the time only.
-_STEPS, _BOTH_LEGS, _BOTH_SHOES = 3, 30, 6
-#: So near (m) the edge of a thing that has stood for so long (s) is no second foot; feet are so wide at most (m).
-_SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
 #: Who is believed was seen so often, and in this share of the scans that should have shown him.
 _HITS, _STEADY = 4.0, 0.6
 #: Who walks is believed after so long (s), or never.
@@ -80,48 +55,6 @@ _UNITE_M, _BOTH = 0.45, 0.25
 _BEHIND_S = 4.0
 #: A mover is told again when it has moved so far (m).
 _TELL_M = 0.05
-
-
-@njit(cache=True)
-def _is_lone(body: Any, t: float) -> bool:
-    """Whether all that is seen of a person, unmoved for some time, may be a thing or two."""
-    no_shoe = wears_shoes(body) and body.width > LONGEST_SHOE_M
-    if body.robot or body.wide > 0.6 or (body.width > _LEGS_M and not no_shoe):
-        return False
-    apart = norm(body.ax - body.bx, body.ay - body.by)
-    a, b = t - body.a_seen, t - body.b_seen
-    if max(a, b) < _BOTH_SEEN_S and apart < _ONE_M and body.odd != UNLIKE:
-        return True
-    since = body.a_since if a < b else body.b_since
-    # What was met beside one who stands may have been the foot of somebody who passes.
-    stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
-    both = apart < _STANCE_M or stood > _STOOD_S
-    came = norm(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH
-    if (has_walked(body) or came) and _is_two(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
-        # One leg hides the other for as long as he likes.
-        return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
-    sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
-    if body.still > _STILL_S or sliver:
-        return True
-    return bool(max(a, b) > 1.0 and t - since > 1.0)
-
-
-@njit(cache=True)
-def _is_two(body: Any) -> bool:
-    """Whether it has shown both feet as often as a person does since it was last found to be nowhere."""
-    return bool(body.doubted == 0 or body.both - body.doubted >= _both_feet(body))
-
-
-@njit(cache=True)
-def has_walked(body: Any) -> bool:
-    """Whether it has come on two feet, step by step."""
-    return bool(body.own_pace_n >= _STEPS and body.both >= _both_feet(body))
-
-
-@njit(cache=True)
-def _both_feet(body: Any) -> int:
-    """In how many scans a person has shown both feet."""
-    return _BOTH_SHOES if body.shoe >= SHOES or wears_shoes(body) else _BOTH_LEGS
 
 
 @njit(cache=True)
@@ -281,25 +214,7 @@ def review(
                 actions[b] = CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
             continue
         if unseen == 0.0:
-            only_a = body.a_seen >= body.b_seen
-            foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
-            if _is_lone(body, t):
-                x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
-                behind = t - at > 0.5 and clear(x, y, _STEP_M, ranges, states, longest, pose, first, step) == HIDDEN
-                if body.lone == 0.0:
-                    body.lone_x, body.lone_y = foot_x, foot_y
-                if body.older > _OLDER_S:
-                    body.lone += dt * _FASTER
-                elif not behind or body.odd == ALONE:
-                    body.lone += dt * (_FASTER if body.odd and not behind else 1.0)
-                elif norm(foot_x - x, foot_y - y) > _STRIDE_M:
-                    body.lone += dt / _SLOWER
-            elif (
-                max(t - body.a_seen, t - body.b_seen) < 1.0
-                or norm(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M
-            ):
-                # What was hidden meanwhile goes on being alone.
-                body.lone = 0.0
+            count_lone(bodies, b, t, dt, (ranges, states, longest, pose, first, step))
             single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
             body.single = body.single + dt if single else 0.0
             if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):

@@ -12,6 +12,7 @@ from tms_agents.floor.absent import Absent
 from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.lone import has_walked
 from tms_agents.floor.masks import Area
 from tms_agents.floor.place import place, tell
 from tms_agents.floor.review import (
@@ -22,7 +23,6 @@ from tms_agents.floor.review import (
     LOST,
     NOTHING,
     doubled,
-    has_walked,
     is_footless,
     outside,
     review,

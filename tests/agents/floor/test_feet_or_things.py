@@ -206,6 +206,27 @@ def test_somebody_new_who_is_only_what_lies_there_is_no_reason_to_wait(b_print: 
     assert prints["spare"][4] == pytest.approx(counted)
 
 
+@pytest.mark.parametrize(("away", "counted"), [(0.8, 1.0), (0.4, 0.0)])
+def test_a_robot_beside_what_lies_there_is_no_reason_to_wait(away: float, counted: float) -> None:
+    """Unless it is so near that it may be a part of it."""
+    bodies, prints = crowd(robot=1, machine=1, x=-away, far=0.6)
+    prints["owner"][:4] = 0
+    prints["first"][4] = NOW - 1.0
+    count_feet(prints, bodies, NOW, 1.0)
+    assert prints["spare"][4] == pytest.approx(counted)
+
+
+@pytest.mark.parametrize(("lay_s", "one_foot_s", "counted"), [(5.0, 0.2, 1.0), (3.5, 0.2, 0.0), (5.0, 1.0, 0.0)])
+def test_who_showed_both_feet_beside_it_before_he_was_hidden_has_not_stepped_on_it(
+    lay_s: float, one_foot_s: float, counted: float
+) -> None:
+    bodies, prints = crowd(stale=1, seen=NOW - 3.0, a_seen=NOW - 3.0, b_seen=NOW - 3.0 - one_foot_s)
+    prints["owner"][:4] = 0
+    prints["first"][4] = NOW - lay_s
+    count_feet(prints, bodies, NOW, 1.0)
+    assert prints["spare"][4] == pytest.approx(counted)
+
+
 @pytest.mark.parametrize(("away", "may_step"), [(0.7, True), (1.6, False)])
 def test_nobody_begins_by_a_step_that_is_too_long(away: float, may_step: bool) -> None:
     """Two things put down soon after each other are nobody who goes from one to the other."""

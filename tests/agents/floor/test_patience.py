@@ -54,6 +54,11 @@ def test_what_a_hand_put_there_is_nobodys_leg_once_nobody_is_near() -> None:
     assert wanted(0.5, unseen_s=5.0, whole=0, given=1) > 10.0  # he may still be there, hidden
 
 
+def test_what_a_hand_put_there_is_nobodys_leg_if_who_is_near_shows_both_elsewhere() -> None:
+    assert wanted(0.5, whole=0, given=1, spare=5.0) == 0.0
+    assert wanted(0.5, whole=0, given=1, spare=3.0) > 10.0
+
+
 def test_whose_foot_it_was_has_gone_if_both_his_feet_are_seen_elsewhere() -> None:
     assert wanted(2.0, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) == 0.0
     assert wanted(0.5, whole=0, whose=1, owned=NOW - 2.0, busy=NOW - 2.0) > 10.0

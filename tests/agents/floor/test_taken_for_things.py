@@ -103,13 +103,16 @@ def found(bodies: np.ndarray, seconds: float, view: tuple = OPEN) -> list[int]:
 
 
 def standing(x: float, other_x: float, *, shoe: float = 0.0) -> np.ndarray:
-    """Somebody known who stands with one foot at x, seen, since a second ago, the other seen last at ``other_x``."""
+    """Somebody known who stands with one foot at x, seen, since a second ago, the other seen last at ``other_x``.
+
+    He was out of sight for two seconds before.
+    """
     bodies = empty(BODY, 1)
     bodies["used"] = bodies["confirmed"] = 1
     bodies["own_pace_n"], bodies["both"], bodies["hits"], bodies["quality"] = 5, 200, 500, 1.0
     bodies["x"], bodies["ax"], bodies["told_x"], bodies["bx"], bodies["shoe"] = x, x, x, other_x, shoe
     bodies["a_land"] = bodies["a_since"] = NOW - 1.0
-    bodies["b_land"], bodies["b_seen"] = NOW - 2.0, NOW - 1.0
+    bodies["b_land"], bodies["b_seen"] = NOW - 4.0, NOW - 3.0
     return bodies
 
 
@@ -205,7 +208,8 @@ def test_who_would_stand_on_one_shoe_is_somewhere_else(odd: int, lost: bool) -> 
 def test_two_feet_at_one_place_are_one_thing(apart: float, odd: int, lost: bool) -> None:
     """Now this part of a box is met, now that, and each is taken for a foot."""
     bodies = standing(2.0, 2.0 + apart)
-    bodies["odd"] = odd
+    bodies["odd"], bodies["b_print"] = odd, 1
+    bodies["own_pace_n"] = 0
     actions = np.zeros(1, np.int64)
     said = []
     for k in range(60):
@@ -220,8 +224,8 @@ def test_two_feet_at_one_place_are_one_thing(apart: float, odd: int, lost: bool)
 def test_who_has_stood_for_long_has_not_stepped_to_where_somebody_passes(stood: float, lost: bool) -> None:
     """His other foot, behind the first, seems to be half a metre away for a moment."""
     bodies = standing(2.0, 2.55)
-    bodies["a_land"] = bodies["a_since"] = NOW - stood
-    bodies["b_land"], bodies["b_seen"] = NOW - 1.0, NOW - 0.8
+    bodies["a_land"], bodies["a_since"] = NOW - stood, NOW - 1.0
+    bodies["b_land"], bodies["b_seen"] = NOW - 2.9, NOW - 2.8
     assert (LOST in found(bodies, 8.0)) == lost
 
 
