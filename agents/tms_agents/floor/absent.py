@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 _DOOR_M, _GONE_M = 1.0, 0.3
 #: Who was seen for so many scans is somebody.
 _SOMEBODY = 30
-#: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s).
-_AWAY_M, _SPEED, _WAIT_S = 1.0, 1.0, 20.0
+#: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s). He may stand on
+#: where he was for so long (s); who was lost so lately turns up rather than who was lost before.
+_AWAY_M, _SPEED, _WAIT_S, _LATELY_S = 1.0, 1.0, 60.0, 20.0
 #: Who was seen last so far (m) on this side of the threshold may have turned round; then he is seen again within this
 #: (s), and believed so long (s) after that at most.
 _THRESHOLD_M, _TURNS_S, _BELIEVED_S = 0.25, 6.0, 1.5
@@ -84,7 +85,7 @@ class Absent:
 
     def find(self, body: Any, scattered: Array) -> Any:
         """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `alike` takes."""
-        for lost, within_s in ((self._turning, _TURNS_S), (self._bodies if self._inside(body) else [], _WAIT_S)):
+        for lost, within_s in ((self._turning, _TURNS_S), (self._bodies if self.inside(body) else [], _WAIT_S)):
             index = self._likeliest(lost, body, scattered, within_s)
             if index is not None:
                 return lost.pop(index)
@@ -92,31 +93,31 @@ class Absent:
 
     def rises(self, bodies: Any, body: Any, scattered: Array) -> int | None:
         """Which of the ``bodies`` (n,), who seemed to sit down, is this new one: he went on where nobody saw it."""
-        if not self._inside(body):
+        if not self.inside(body):
             return None
         seated = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == SEATED))
         index = self._likeliest([bodies[i] for i in seated], body, scattered, _PASSES_S)
         return None if index is None else int(seated[index])
 
-    def _inside(self, body: Any) -> bool:
+    def inside(self, body: Any) -> bool:
         """Whether the new one began too far from the doors, where they are known, to have come in."""
         return _DOOR_M <= self._gates.distance(float(body["x0"]), float(body["y0"])) < math.inf
 
     @staticmethod
     def _likeliest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> int | None:
         """Which of those ``lost``, this long ago at most, the body most probably is, or None."""
-        best, best_cost = None, 1.0
+        best, best_cost = None, math.inf
         for index, one in enumerate(lost if body["wide"] <= 0.3 else []):
             since = max(0.0, float(body["first"]) - float(one["seen"]))
             gap = math.hypot(body["x0"] - one["x"], body["y0"] - one["y"]) / (_AWAY_M + _SPEED * since)
             likely = float(alike(body, one, scattered))
-            cost = 0.5 * gap + 0.5 * likely / _UNLIKE
+            cost = 0.5 * gap + 0.5 * likely / _UNLIKE + (since > _LATELY_S)
             if since < within_s and gap < 1.0 and likely > _UNLIKE and cost < best_cost:
                 best, best_cost = index, cost
         return best
 
-    def stands(self, print_: Any, bodies: Any) -> bool:
-        """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost.
+    def stands(self, print_: Any, bodies: Any, t: float) -> bool:
+        """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost of late.
 
         Not if it was taken for a foot of one of the ``bodies`` (n,), who has left it.
         """
@@ -124,7 +125,8 @@ class Absent:
             not has_left(print_, bodies)
             and not thin(print_)
             and any(
-                print_["rested"] > one["seen"] - _JUST_S
+                t - one["seen"] < _LATELY_S
+                and print_["rested"] > one["seen"] - _JUST_S
                 and math.hypot(print_["x"] - one["x"], print_["y"] - one["y"]) < _STEPS_M
                 for one in self._bodies
             )

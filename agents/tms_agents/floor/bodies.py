@@ -121,6 +121,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.ex, body.ey, body.e_at = 0.0, 0.0, -1e9
     body.sole, body.sole_n, body.own_sole, body.own_sole_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure, body.doubted, body.held = 0.0, 0, 1.0, 0, -1e9
+    body.suspected = -1e9
 
 
 @njit(cache=True)

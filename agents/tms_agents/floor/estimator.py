@@ -45,8 +45,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 13: when a body was last in doubt, and until when it is held.
-_FORMAT = 13
+#: Of saved states; 14: when somebody began to be seen who may be who a body was.
+_FORMAT = 14
 
 
 class FloorEstimator:
@@ -199,7 +199,7 @@ class FloorEstimator:
         edge = q["width"] < _EDGE_M or q["whole"] < 0.8 * q["hits"]
         sliver = (q["attached"] > 0.02 and edge) or (q["beams"] < 2.0 and not q["given"])
         unsettled = sliver and started < self._settings.learn_s + _UNSETTLED_S
-        if unsettled or (not q["given"] and self._tracks.absent.stands(q, self._tracks.bodies)):
+        if unsettled or (not q["given"] and self._tracks.absent.stands(q, self._tracks.bodies, t)):
             return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED

@@ -15,12 +15,13 @@ from tms_agents.floor.build import LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.freespace import HIDDEN, clear
 from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import ALONE, UNLIKE
+from tms_agents.floor.twice import suspected
 
 #: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody
 #: leaves a foot so far (m) behind, but it may have come and be hidden here: time counts less.
 _STEP_M, _STRIDE_M, _SLOWER = 0.1, 0.9, 2.0
-#: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, is most
-#: likely a thing: time counts more.
+#: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, or who
+#: he was may have begun elsewhere: it is most likely a thing, time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
 #: Of who cannot have gone time counts so much; who was not seen for so long (s) may have.
 _IN_SIGHT, _GAP_S = 0.1, 1.0
@@ -63,7 +64,7 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
     behind = t - at > 0.5 and clear(x, y, _STEP_M, *sight) == HIDDEN
     if body.lone == 0.0:
         body.lone_x, body.lone_y = foot_x, foot_y
-    if body.older > _OLDER_S:
+    if body.older > _OLDER_S or suspected(body):
         body.lone += dt * _FASTER
     elif not behind or body.odd == ALONE:
         faster = _FASTER if body.odd and not behind else 1.0
@@ -105,8 +106,8 @@ def _is_lone(body: Any, t: float) -> bool:
     # What was met beside one who stands may have been the foot of somebody who passes.
     stood = body.b_land - body.a_land if a < b else body.a_land - body.b_land
     both = apart < _STANCE_M or stood > _STOOD_S
-    came = norm(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH
-    if (has_walked(body) or came) and _is_two(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
+    came = (has_walked(body) or has_come(body)) and not suspected(body)
+    if came and _is_two(body) and body.older < _OLDER_S and not body.odd and both and not no_shoe:
         # One leg hides the other for as long as he likes.
         return bool(body.still > _STILL_S or (body.shoe >= SHOES and min(max(a, b), t - since) > _SHOD_S))
     sliver = apart < 0.5 * min(body.width, _SHOE_M) + _SLIVER_M and t - min(body.a_since, body.b_since) > _SLIVER_S
@@ -125,6 +126,12 @@ def _is_two(body: Any) -> bool:
 def has_walked(body: Any) -> bool:
     """Whether it has come on two feet, step by step."""
     return bool(body.own_pace_n >= _STEPS and body.both >= _both_feet(body))
+
+
+@njit(cache=True)
+def has_come(body: Any) -> bool:
+    """Whether it rests elsewhere than it began, and has shown both feet now and then."""
+    return bool(norm(body.rest_x - body.x0, body.rest_y - body.y0) > _CAME_M and body.both >= _CAME_BOTH)
 
 
 @njit(cache=True)

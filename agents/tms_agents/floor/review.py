@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.bodies import misled
 from tms_agents.floor.build import SHOES
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
-from tms_agents.floor.lone import count_lone, has_walked
+from tms_agents.floor.lone import count_lone, has_come, has_walked
 from tms_agents.floor.masks import distance
 from tms_agents.floor.norm import norm
 
@@ -25,7 +25,7 @@ _NEW_S = 30.0
 _LONE_S = 4.0
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
-#: Of whom no two feet were seen, and who rests for so long (s), is a thing.
+#: Who has not come from elsewhere on two feet, and rests for so long (s), is a thing.
 _INERT_S = 30.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
@@ -89,7 +89,8 @@ def _is_parked(body: Any, t: float) -> bool:
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
         return bool(t - since > _PARKED_S)
-    if t - body.rest_at > _INERT_S and not body.robot and not has_walked(body) and not _is_known(body):
+    inert = t - body.rest_at > _INERT_S and not body.robot and not has_come(body)
+    if inert and not has_walked(body) and not _is_known(body):
         return True
     if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
         # It came by itself.

@@ -69,9 +69,9 @@ CONCEALED, SEATED = 1, 2
 #: one foot alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it
 #: has stayed (rest), how wide the legs are (m, 0: unknown), whether what is seen of it is no foot, and why (odd,
 #: `prints.UNLIKE`), the line on which the shoe last seen from its side lay (ex, ey), and when (e_at), in how many scans
-#: both feet had been seen (both) when it was last found to be nowhere (doubted), and until when it stays where it was
-#: put back (held, s). Of one not believed yet: in how many scans it was seen (hits), could have been (looks), and was
-#: or should have been (due).
+#: both feet had been seen (both) when it was last found to be nowhere (doubted), until when it stays where it was put
+#: back (held, s), and when somebody began to be seen, far from every door, who may be who it was (suspected). Of one
+#: not believed yet: in how many scans it was seen (hits), could have been (looks), and was or should have been (due).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -174,6 +174,7 @@ BODY = np.dtype(
         ("sure", "f8"),
         ("doubted", "i8"),
         ("held", "f8"),
+        ("suspected", "f8"),
     ]
 )
 

@@ -30,6 +30,7 @@ from tms_agents.floor.review import (
 )
 from tms_agents.floor.settings import FloorSettings, Scene
 from tms_agents.floor.state import CONCEALED, SEATED
+from tms_agents.floor.twice import began, suspect
 
 #: How much what is seen next of somebody lost must look like feet.
 _DOUBTED = 0.5
@@ -213,6 +214,8 @@ class Tracks:
         if body["seen"] == t:
             # What is seen is something else.
             self._association.decide(index)
+            if (new := began(self.bodies, body)) >= 0:
+                return self._one(index, new, t)
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
             body["lone"] = body["wide"] = 0.0
@@ -225,6 +228,13 @@ class Tracks:
         body["vx"] = body["vy"] = 0.0
         moved: list[FloorEvent] = [Moved(t, *self._tell(index, t))] if seated else []
         return [*moved, Stale(t, int(body["label"]))]
+
+    def _one(self, index: int, new: int, t: float) -> list[FloorEvent]:
+        """The mover at ``index`` is somewhere else, where there seemed to be a ``new`` one: his label goes."""
+        vanished = Vanished(t, int(self.bodies[new]["label"]), float(self.bodies[new]["seen"]), t)
+        self._go_on(new, self.bodies[index])
+        label, xy, cov = self._tell(new, t)
+        return [vanished, Stale(t, label) if self.bodies[new]["stale"] else Moved(t, label, xy, cov)]
 
     def _seated(self, body: Any) -> bool:
         return body["stale"] == SEATED or self._nearest(self._seats, body) < _SEAT_M
@@ -286,19 +296,24 @@ class Tracks:
         elif not is_footless(body):
             old = self.absent.find(body, self._association.scattered)
         if old is not None:
-            stale, label, first = int(old["stale"]), int(old["label"]), float(old["first"])
-            for field in OWN:
-                body[field] = old[field]
-            old["used"] = 0
-            body["confirmed"], body["label"], body["first"] = 1, label, first
-            self._association.named(index, _xy(old))
-            body["robot"] = old["robot"]
+            body["confirmed"], body["robot"] = 1, old["robot"]
+            self._go_on(index, old)
             label, xy, cov = self._tell(index, t)
-            return [Back(t, label, xy)] if stale else [Moved(t, label, xy, cov)]
+            return [Back(t, label, xy)] if old["stale"] else [Moved(t, label, xy, cov)]
         body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
         self._association.named(index)
+        if self.absent.inside(body) and not robot and not is_footless(body):
+            suspect(self.bodies, index, t)
         label, xy, cov = self._tell(index, t)
         return [Appeared(t, label, "mover", xy, cov, robot, float(body["first"]), (), float(body["width"]))]
+
+    def _go_on(self, index: int, old: Any) -> None:
+        """The mover at ``index`` is who the ``old`` body was, which is no more."""
+        body = self.bodies[index]
+        for field in (*OWN, "label", "first"):
+            body[field] = old[field]
+        old["used"] = 0
+        self._association.named(index, _xy(old))
 
     def _tell(self, index: int, t: float) -> tuple[int, tuple[float, float], Covariance]:
         """(label, place, covariance) of the mover, which is told now."""

@@ -127,9 +127,16 @@ def test_of_two_the_one_who_looks_like_it(absent: Absent) -> None:
 
 def test_who_does_not_turn_up_has_left(absent: Absent) -> None:
     absent.keep(person(4.0, 4.0, label=5))
-    assert absent.gone(25.0) == []
-    assert absent.gone(31.0) == [Vanished(31.0, 5, 10.0, 31.0)]
-    assert absent.gone(32.0) == []
+    assert absent.gone(65.0) == []
+    assert absent.gone(71.0) == [Vanished(71.0, 5, 10.0, 71.0)]
+    assert absent.gone(72.0) == []
+
+
+@pytest.mark.parametrize(("seen", "label"), [(10.0, 2), (45.0, 1)])
+def test_who_was_lost_of_late_turns_up_rather_than_who_was_lost_before(absent: Absent, seen: float, label: int) -> None:
+    absent.keep(person(4.2, 4.0, label=1, seen=seen))
+    absent.keep(person(5.0, 4.0, label=2, seen=45.0))
+    assert absent.find(person(4.0, 4.0, first=47.0), expected())["label"] == label
 
 
 def test_who_is_waited_for_is_so_after_a_restart(absent: Absent) -> None:
@@ -142,7 +149,7 @@ def test_who_is_waited_for_is_so_after_a_restart(absent: Absent) -> None:
     again.restore(json.loads(json.dumps(absent.save())))
     assert again.gone(19.0) == [Vanished(19.0, 7, 10.0, 19.0)]
     assert again.find(person(4.5, 4.0, first=12.0), expected())["label"] == 5
-    assert again.gone(31.0) == [Vanished(31.0, 6, 10.0, 31.0)]
+    assert again.gone(71.0) == [Vanished(71.0, 6, 10.0, 71.0)]
 
 
 def test_nobody_is_saved_too(absent: Absent) -> None:
@@ -150,14 +157,17 @@ def test_nobody_is_saved_too(absent: Absent) -> None:
     assert absent.gone(1e6) == []
 
 
-@pytest.mark.parametrize(("away", "since", "stands"), [(0.5, 12.0, True), (0.5, 2.0, False), (3.0, 12.0, False)])
-def test_what_came_where_somebody_was_lost_may_be_his_foot(
-    absent: Absent, away: float, since: float, stands: bool
+@pytest.mark.parametrize(
+    ("away", "since", "now", "stands"),
+    [(0.5, 12.0, 12.0, True), (0.5, 12.0, 31.0, False), (0.5, 2.0, 12.0, False), (3.0, 12.0, 12.0, False)],
+)
+def test_what_came_where_somebody_was_lost_may_be_his_foot_for_a_while(
+    absent: Absent, away: float, since: float, now: float, stands: bool
 ) -> None:
     absent.keep(person(4.0, 4.0))
     (print_,) = empty(PRINT, 1)
     print_["x"], print_["y"], print_["rested"] = 4.0 + away, 4.0, since
-    assert absent.stands(print_, empty(BODY, 1)) == stands
+    assert absent.stands(print_, empty(BODY, 1), now) == stands
 
 
 @pytest.mark.parametrize(("width", "whole", "stands"), [(0.1, 30, True), (0.05, 30, False), (0.05, 5, True)])
@@ -169,7 +179,7 @@ def test_what_is_thinner_than_a_foot_is_none_of_who_was_lost(
     (print_,) = empty(PRINT, 1)
     print_["x"], print_["y"], print_["rested"] = 4.5, 4.0, 12.0
     print_["width"], print_["hits"], print_["whole"] = width, 30, whole
-    assert absent.stands(print_, empty(BODY, 1)) == stands
+    assert absent.stands(print_, empty(BODY, 1), 12.0) == stands
 
 
 @pytest.mark.parametrize(("whose", "both_seen", "may_stand"), [(5, True, False), (6, True, True), (5, False, True)])
@@ -181,4 +191,4 @@ def test_what_somebody_else_stood_on_and_has_left_is_no_foot_of_who_was_lost(
     bodies[0] = person(5.5, 4.0, label=5, seen=14.0)
     bodies["a_seen"], bodies["b_seen"] = 14.0, 14.0 if both_seen else 12.0
     print_["x"], print_["y"], print_["rested"], print_["whose"] = 4.2, 4.0, 12.0, whose
-    assert absent.stands(print_, bodies) == may_stand
+    assert absent.stands(print_, bodies, 12.0) == may_stand

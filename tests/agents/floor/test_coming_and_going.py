@@ -190,12 +190,19 @@ def test_who_is_hidden_does_not_go_on_through_a_wall() -> None:
     assert label.xy[0] == pytest.approx(4.7)
 
 
-@pytest.mark.parametrize(("steps", "feet", "gone"), [(0, 0, True), (0, 250, False), (5, 40, False)])
-def test_what_rests_and_never_showed_two_feet_or_took_a_step_is_a_thing(steps: int, feet: int, gone: bool) -> None:
+@pytest.mark.parametrize(
+    ("steps", "feet", "x0", "gone"),
+    [(0, 0, 0.0, True), (0, 14, 3.0, True), (0, 14, 0.0, False), (0, 250, 3.0, False), (5, 40, 3.0, False)],
+    ids=["no feet", "stays where it was", "comes", "shuffles", "walks"],
+)
+def test_what_rests_and_never_showed_two_feet_or_took_a_step_is_a_thing(
+    steps: int, feet: int, x0: float, gone: bool
+) -> None:
     """A bin that was pushed is as wide as two feet side by side, and has none. Who shuffles takes no steps."""
     bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
     walker(bodies[0], 3.0, 0.0, (0.0, 0.0), NOW)
     bodies["own_pace_n"], bodies["both"], bodies["rest_at"], bodies["rest_x"] = steps, feet, NOW - 31.0, 3.0
+    bodies["x0"] = x0
     review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
     assert (actions[0] == GONE) == gone
 

@@ -1,0 +1,50 @@
+"""Who begins to be seen far from every door was there before: he is one of those who stand beside, it seems, where a
+thing lies that he has put down."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from tms_agents.floor.norm import norm
+
+#: So far (m) from where somebody or a foot of his is one may begin who was he, and farther, this fast (m/s), the longer
+#: (s, at most) ago both his feet were seen.
+_AWAY_M, _SPEED, _GONE_S = 1.2, 1.2, 3.0
+#: Who was seen so lately (s) seems to be there.
+_THERE_S = 0.5
+#: What he has put down he put down before he was seen elsewhere, or seemed to tread on so shortly (s) after that.
+_PUT_S = 0.5
+
+
+@njit(cache=True)
+def suspect(bodies: Any, index: int, t: float) -> None:
+    """Note of all ``bodies`` (n,) that may be things which the new one at ``index`` has left: ``suspected``."""
+    new = bodies[index]
+    for b in range(bodies.size):
+        body = bodies[b]
+        if b == index or not body.used or not body.confirmed or body.robot or body.stale or t - body.seen > _THERE_S:
+            continue
+        away = min(norm(new.x0 - body.ax, new.y0 - body.ay), norm(new.x0 - body.bx, new.y0 - body.by))
+        away = min(away, norm(new.x0 - body.x, new.y0 - body.y))
+        gone_s = min(max(0.0, new.first - min(body.a_seen, body.b_seen)), _GONE_S)
+        if away < _AWAY_M + _SPEED * gone_s:
+            body.suspected = new.first
+
+
+@njit(cache=True)
+def suspected(body: Any) -> bool:
+    """Whether the body has stood on what is seen of it now since before somebody began who may be who it was."""
+    land = body.a_land if body.a_seen >= body.b_seen else body.b_land
+    return bool(land < body.suspected + _PUT_S)
+
+
+def began(bodies: Any, body: Any) -> int:
+    """Which of ``bodies`` (n,) is who the body was, if it is `suspected` to be a thing now; -1: none."""
+    if not suspected(body):
+        return -1
+    there = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["label"] > body["label"])
+    found = np.flatnonzero(there & (bodies["first"] == body["suspected"]))
+    return int(found[0]) if found.size else -1
