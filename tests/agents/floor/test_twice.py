@@ -75,7 +75,7 @@ def test_who_begins_beside_one_who_stands_may_be_he(
 
 def test_who_comes_in_by_a_door_is_not() -> None:
     one = room([DOOR])
-    stander(one.bodies[0], NOW - 1.5, x=6.8, ax=6.8, bx=6.8, rest_x=6.8, told_x=6.8)
+    stander(one.bodies[0], NOW - 1.5, x=6.6, ax=6.6, bx=6.6, rest_x=6.6, told_x=6.6)
     comer(one.bodies[1], 7.6, 1.0, NOW - 1.0)
     assert [type(event) for event in at(one, NOW)] == [Appeared]
     assert one.bodies["suspected"][0] < 0.0
