@@ -185,9 +185,8 @@ class FloorEstimator:
         x, y = float(q["x"]), float(q["y"])
         if self._masks.outside(x, y) or (kind == OBJECT and self._objects.at(q)):
             return []
-        brought = q["busy"] >= q["rested"] or brings(q, self._tracks.bodies)
-        waits_s = _STOPS_S if brought else _WAITS_S
-        waits = kind == OBJECT and not q["given"] and t - q["first"] < waits_s and self._gates.distance(x, y) == 0.0
+        waits_s = _STOPS_S if brings(q, self._tracks.bodies) else _WAITS_S
+        waits = kind == OBJECT and not q["given"] and t - q["rested"] < waits_s and self._gates.distance(x, y) == 0.0
         if waits and not has_left(q, self._tracks.bodies):
             return []
         started = min(view.background.seconds for view in self._views.values())

@@ -29,8 +29,9 @@ _SEEN_S, _FAR_M = 0.5, 0.9
 #: What is nobody's foot for so long (s), though everybody near it shows both of his elsewhere, is a thing. It may be a
 #: part of one that is moved: what is hardly ever seen whole rests for longer (s).
 SPARE_S, _PART_S = 2.0, 4.0
-#: Who began to be seen so shortly (s) before or after something came to rest, and so near (m), may have brought it.
-_BRINGS_S, _BRINGS_M = 3.0, 1.0
+#: Who was beside something so shortly (s) before it came to rest, or began to be seen so shortly before or after that,
+#: and so near (m), may have brought it.
+_LEFT_S, _BRINGS_S, _BRINGS_M = 1.0, 3.0, 1.0
 
 
 @njit(cache=True)
@@ -77,7 +78,9 @@ def _somebody_near(q: Any, bodies: Any) -> bool:
 
 @njit(cache=True)
 def brings(q: Any, bodies: Any) -> bool:
-    """Whether somebody began to be seen beside the print when it came to rest: he may have brought it in."""
+    """Whether somebody was there when the print came to rest, or began to be seen beside it: he may have brought it."""
+    if q.busy >= q.rested - _LEFT_S:
+        return True
     for b in range(bodies.size):
         body = bodies[b]
         came = body.used and body.confirmed and not body.robot and abs(body.first - q.rested) < _BRINGS_S

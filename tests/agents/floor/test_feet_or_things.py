@@ -114,6 +114,12 @@ def test_who_began_beside_what_came_to_rest_may_have_brought_it_in(fields: dict[
     assert brings(resting(10.0)[0], bodies) == known
 
 
+@pytest.mark.parametrize(("busy", "known"), [(-9.0, True), (-10.5, True), (-12.0, False)])
+def test_who_was_beside_it_when_it_came_to_rest_or_just_before_may_have_brought_it(busy: float, known: bool) -> None:
+    """A part of it was seen while he hid the rest: it seemed to come to rest when he had gone."""
+    assert brings(resting(10.0, busy=NOW + busy)[0], empty(BODY, 1)) == known
+
+
 @pytest.mark.parametrize(("apart", "released"), [(0.3, 0), (0.4, 1)])
 def test_who_stands_on_two_feet_side_by_side_keeps_both(apart: float, released: int) -> None:
     """One shoe shows its tip; a thing that is so thin lies farther off."""
@@ -267,6 +273,16 @@ def test_what_is_left_in_a_door_is_told_when_who_left_it_is_elsewhere() -> None:
     (put,) = [event for event in events if isinstance(event, Appeared) and event.kind == "object"]
     assert put.t < 20.0
     assert math.dist(put.xy, (4.0, 2.05)) < 0.03
+
+
+def test_what_lies_in_a_door_is_told_as_soon_though_somebody_hides_it_meanwhile() -> None:
+    door = [(3.9, 1.0), (5.0, 1.0), (5.0, 3.0), (3.9, 3.0)]
+    scene = Scene(region=[(0, 0), (5, 0), (5, 4), (0, 4)], gates=[door])
+    stays = [(7.0, 4.9, 2.6), (10.0, 2.2, 2.6), (20.0, 2.2, 2.6)]
+    hides = [(22.0, 2.2, 0.87), (24.0, 2.2, 0.87), (25.0, 2.2, 1.6), (60.0, 2.2, 1.6)]
+    _, events = Room(together(walker(stays + hides), thing(4.4, 1.5, 0.05, 12.0))).play(45.0, scene=scene)
+    (put,) = [event for event in events if isinstance(event, Appeared) and event.kind == "object"]
+    assert put.t == pytest.approx(37.0, abs=0.5)
 
 
 @pytest.mark.parametrize(("width", "apart", "dearer"), [(0.2, True, 2.0), (0.33, True, 4.0), (0.2, False, 0.0)])
