@@ -74,15 +74,16 @@ def test_the_pies_are_those_of_the_paper(tmp_path: Path) -> None:
 
 def assert_measured(town: Town) -> None:
     """Things are told where they stand, as far as boards and arm can tell."""
-    world = new_world()
+    world, off = new_world(), []
     for cabinet, numbers in START.items():
         for slot, number in enumerate(numbers):
             if number in (2, 3, 4):
                 continue
             best = town.where(ITEMS[number].tag).best
             assert best is not None and best.xy is not None and best.cov is not None
-            off = math.dist(best.xy, world.cabinets[cabinet].slots[slot])
-            assert 0.0 < off < 0.06  # a light thing on a board one and a half metres long
+            off.append(math.dist(best.xy, world.cabinets[cabinet].slots[slot]))
+    # A light thing on a board one and a half metres long; a heavy one may be right to the tenth of a millimetre told.
+    assert 0.0 < max(off) < 0.06
     mug = town.where(ITEMS[2].tag).best
     assert mug is not None and mug.xy is not None
     assert math.dist(mug.xy, (4.3, 2.5)) < 0.03, "forward kinematics of the arm"
