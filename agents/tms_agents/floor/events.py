@@ -54,13 +54,17 @@ class Moved:
 
 @dataclass(frozen=True, slots=True)
 class Vanished:
-    """A label is gone: it was last seen at ``earliest``, and its place was seen to be free at ``latest``."""
+    """A label is gone: it was last seen at ``earliest``, and its place was seen to be free at ``latest``.
+
+    ``into``: it was the same mover as this one, which has what it held.
+    """
 
     t: float
     label: int
     earliest: float
     latest: float
     candidates: Candidates = ()
+    into: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

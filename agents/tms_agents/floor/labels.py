@@ -19,6 +19,7 @@ from tms_schemas.observation import (
     MoverEntered,
     MoverLeft,
     Observation,
+    Transfer,
 )
 
 #: A covariance smaller than this claims more than any installer measures (5 mm).
@@ -188,8 +189,14 @@ class Labels:
     def _left(self, event: Vanished, shift: float) -> Iterator[Observation]:
         mover = self.movers[event.label]
         mover.left = max(self._after(event.t), mover.told_at + _STEP_S)
-        if mover.label is not None:
-            yield MoverLeft(seq=0, observed_at=_utc(mover.left, shift), label=mover.label)
+        if mover.label is None:
+            return
+        same = None if event.into is None else self.movers.get(event.into)
+        at = _utc(mover.left, shift)
+        if same is not None and same.label is not None:
+            yield Transfer(seq=0, observed_at=at, from_=mover.label, to=same.label)
+        else:
+            yield MoverLeft(seq=0, observed_at=at, label=mover.label)
 
     def _lies(self, event: Appeared, shift: float) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))

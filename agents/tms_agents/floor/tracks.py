@@ -215,7 +215,7 @@ class Tracks:
             # What is seen is something else.
             self._association.decide(index)
             if (new := began(self.bodies, body)) >= 0:
-                return self._one(index, new, t)
+                return self._merge(index, new, t)
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
             body["lone"] = body["wide"] = 0.0
@@ -229,11 +229,12 @@ class Tracks:
         moved: list[FloorEvent] = [Moved(t, *self._tell(index, t))] if seated else []
         return [*moved, Stale(t, int(body["label"]))]
 
-    def _one(self, index: int, new: int, t: float) -> list[FloorEvent]:
+    def _merge(self, index: int, new: int, t: float) -> list[FloorEvent]:
         """The mover at ``index`` is somewhere else, where there seemed to be a ``new`` one: his label goes."""
-        vanished = Vanished(t, int(self.bodies[new]["label"]), float(self.bodies[new]["seen"]), t)
+        seemed, seen = int(self.bodies[new]["label"]), float(self.bodies[new]["seen"])
         self._go_on(new, self.bodies[index])
         label, xy, cov = self._tell(new, t)
+        vanished = Vanished(t, seemed, seen, t, into=label)
         return [vanished, Stale(t, label) if self.bodies[new]["stale"] else Moved(t, label, xy, cov)]
 
     def _seated(self, body: Any) -> bool:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tms_agents.floor import Appeared, FloorLabel, Moved, Vanished
 from tms_agents.floor.labels import Labels
 from tms_schemas.events import Near
-from tms_schemas.observation import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft
+from tms_schemas.observation import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft, Transfer
 
 COV = (0.01, 0.0, 0.01)
 SHIFT = 1_000_000.0
@@ -126,6 +126,15 @@ def test_a_taker_who_left_meanwhile_is_still_named():
     assert isinstance(left, MoverLeft)
     (gone,) = floor.observations([Vanished(20.0, 2, 0.5, 20.0, ((1, 0.97),))])
     assert gone.dest == walker.label and 2.0 < at(gone) < at(left)
+
+
+def test_who_was_there_before_has_what_he_seemed_to_hold_under_another_label():
+    floor = labels()
+    entered = floor.observations([mover(10.0, 1), mover(11.0, 2, (2.0, 1.0))])
+    (one,) = floor.observations([Vanished(12.0, 2, 11.9, 12.0, into=1)])
+    assert isinstance(one, Transfer) and (one.from_, one.to) == (entered[1].label, entered[0].label)
+    (left,) = floor.observations([Vanished(13.0, 1, 12.9, 13.0, into=7)])
+    assert isinstance(left, MoverLeft) and left.label == entered[0].label
 
 
 def test_robots_report_themselves_and_are_named_by_where_they_were():

@@ -97,6 +97,7 @@ def test_the_one_who_stands_is_a_thing_and_the_new_one_has_his_name() -> None:
     one = begins([DOOR], 5.0, -0.5)
     events, after_s = later(one, 5.0)
     assert [(type(event), event.label) for event in events] == [(Vanished, 9), (Moved, 1)]
+    assert events[0].into == 1
     assert after_s < 3.0
     (label,) = one.labels(NOW)
     assert (label.id, label.since) == (1, 10.0) and label.xy[0] > 5.0

@@ -53,6 +53,17 @@ async def test_a_thing_is_taken_and_put_elsewhere(lab, tell) -> None:
     assert await anomalies(lab) == []
 
 
+async def test_who_turns_out_to_be_another_has_what_he_took(lab, tell) -> None:
+    await tell("floor", **{**THING, "label": "floor/3", "kind": "floor"})
+    await tell("floor", type="mover_entered", label="floor/2", xy=[0.5, 0.6])
+    await tell("floor", type="label_vanished", label="floor/3", dest="floor/2")
+    assert await p(lab, "E1", "floor/2") > 0.95
+    await tell("floor", type="transfer", from_="floor/2", to="floor/1")
+    assert await p(lab, "E1", "floor/1") > 0.95
+    assert [mover.label for mover in (await lab.belief()).movers().movers] == ["floor/1"]
+    assert await anomalies(lab) == []
+
+
 async def test_labels_lie_on_furniture(lab, tell) -> None:
     await tell("cab", **THING)
     await tell("cab", **{**THING, "label": "cab/2", "tag": "E2", "surface": "desk/top", "xy": [0.6, 0.5]})
