@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Coroutine
 from datetime import datetime, timedelta
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tms_server.clock import Clock
 from tms_server.db.times import to_us
@@ -38,7 +38,7 @@ class Frozen(NamedTuple):
 
 
 class RoomActor:
-    """One room. ``run`` never returns by itself and survives failures of the database."""
+    """One room. ``run`` never returns by itself, survives failures of the database, and cancelled ends a page first."""
 
     def __init__(self, room: str, log: RoomLog, snapshots: Snapshots, settings: Settings, clock: Clock) -> None:
         self.room = room
@@ -61,10 +61,11 @@ class RoomActor:
             try:
                 await self._start()
                 async for page in self._pages():
-                    await self._take(page)
+                    await _to_the_end(self._take(page))
                     pause_s = 0.5
             except Exception:
                 _log.exception("the actor of room %s failed; it starts again in %g s", self.room, pause_s)
+                self._since_snapshot = 0  # a page may be folded in part: nothing to store
                 await asyncio.sleep(pause_s)
                 pause_s = min(2 * pause_s, 30.0)
 
@@ -115,15 +116,16 @@ class RoomActor:
         async with self._folding:
             fold = await self._stored(head, before=None)
             past = Checkpoints(fold)
-            self._since_snapshot = 0
+            since_snapshot = 0
             horizon = self._horizon()
             held: list[Record] = []
             async for page in self._log.replay(self.room, after=fold.position, until=None, head=head):
                 due = [record for record in page if record.observed_at <= horizon]
                 held += page[len(due) :]
                 await asyncio.to_thread(_fold_all, fold, past, due)
-                self._since_snapshot += len(due)
+                since_snapshot += len(due)
             self._fold, self._past, self._held, self.head = fold, past, HoldBack(held), head
+            self._since_snapshot = since_snapshot
             self._publish()
 
     async def _pages(self) -> AsyncIterator[list[Written]]:
@@ -216,6 +218,19 @@ class RoomActor:
             # It only saves time at the next start, and the next one may succeed.
             _log.warning("no snapshot of room %s: %s", self.room, error)
         self._since_snapshot = 0
+
+
+async def _to_the_end(step: Coroutine[Any, Any, None]) -> None:
+    """Await ``step``, and where that is cancelled still all of it.
+
+    A thread folds on whoever is cancelled, and a transaction that is let go half done may keep the write lock.
+    """
+    running = asyncio.ensure_future(step)
+    try:
+        await asyncio.shield(running)
+    except asyncio.CancelledError:
+        await asyncio.gather(running, return_exceptions=True)
+        raise
 
 
 def _fold_all(fold: RoomFold, past: Checkpoints, records: list[Record]) -> None:

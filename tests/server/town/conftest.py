@@ -74,9 +74,9 @@ class Lab:
     async def belief(self, room: str = "lab", **when: Any) -> RoomView:
         return await self.town.belief(room, **when)
 
-    async def sequential(self, room: str = "lab") -> RoomFold:
-        """The whole log folded in fold order by somebody who knows nothing of actors."""
-        records = [r for r in await self.town.records(room, 0, 100_000) if not r.late]
+    async def sequential(self, room: str = "lab", *, until: int = 100_000) -> RoomFold:
+        """The log up to an offset folded in fold order by somebody who knows nothing of actors."""
+        records = [r for r in await self.town.records(room, 0, until) if not r.late and r.offset <= until]
         fold = RoomFold(Settings().budget)
         for record in sorted(records, key=lambda record: record.position):
             fold.apply(record)

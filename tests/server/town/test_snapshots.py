@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -13,7 +15,7 @@ from tms_server.log.snapshots import thinned_out
 from tms_server.town.fold import RoomFold
 
 
-async def tell(lab: Any, at: Any, first: int, last: int) -> None:
+def course(at: Any, first: int, last: int) -> Iterator[dict[str, Any]]:
     """A person walks, and things come and go, one observation a second."""
     for seq in range(first, last):
         event: dict[str, Any] = {"type": "label_moved", "label": "floor/0", "xy": [seq % 8, 1]}
@@ -24,7 +26,12 @@ async def tell(lab: Any, at: Any, first: int, last: int) -> None:
             event = {"type": "label_appeared", "label": f"floor/{seq}", "kind": "floor", "xy": [seq % 8, 1], "tag": tag}
         elif seq % 5 == 3:
             event = {"type": "label_vanished", "label": f"floor/{seq - 2}"}
-        await lab.post("floor", {"seq": seq, "observed_at": at(seq), **event})
+        yield {"seq": seq, "observed_at": at(seq), **event}
+
+
+async def tell(lab: Any, at: Any, first: int, last: int) -> None:
+    for event in course(at, first, last):
+        await lab.post("floor", event)
 
 
 @pytest.fixture
@@ -74,6 +81,23 @@ def test_torn_anywhere_it_is_refused() -> None:
     for cut in range(len(whole)):
         with pytest.raises(ValueError):
             RoomFold.from_bytes(whole[:cut])
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.02, 0.1])
+async def test_closed_in_the_middle_of_a_batch_it_is_of_the_whole_batch(open_lab, at, later_s: float) -> None:
+    async with open_lab() as lab:
+        await lab.room(tags=["E0", "E1", "E2"])
+        await lab.belief()
+        await tell(lab, at, 0, 5)  # since then nobody has asked: the state of that moment is not copied yet
+        await asyncio.sleep(0.2)
+        await lab.post("floor", *course(at, 5, 600))
+        await asyncio.sleep(later_s)
+    async with open_lab() as lab:
+        async with lab.sessions.read() as session:
+            stored = {row.offset: row.body for row in await session.scalars(select(SnapshotRow))}
+        assert stored
+        for offset, body in stored.items():
+            assert body == (await lab.sequential(until=offset)).to_bytes()
 
 
 async def test_one_of_another_budget_is_left_out(open_lab, told: bytes) -> None:
