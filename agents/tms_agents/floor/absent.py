@@ -31,6 +31,9 @@ _THRESHOLD_M, _TURNS_S, _BELIEVED_S = 0.25, 6.0, 1.5
 _PASSES_S = 6.0
 #: So near (m) where he was lost he may stand, since so long (s) before that at most.
 _STEPS_M, _JUST_S = 1.2, 4.0
+#: Of who stands among others a part is hidden now and then: what is always seen whole is no foot of his, unless it is
+#: as wide (m) as a shoe from its side; nor is an edge of something, so wide (m), nor what is so near (m) somebody seen.
+_SIDE_M, _EDGE_M, _BESIDE_M = 0.17, 0.02, 0.45
 #: Who looks and walks as unlikely as this (log likelihood) is somebody else.
 _UNLIKE = -6.0
 
@@ -121,16 +124,27 @@ class Absent:
 
         Not if it was taken for a foot of one of the ``bodies`` (n,), who has left it.
         """
-        return (
-            not has_left(print_, bodies)
-            and not thin(print_)
-            and any(
-                t - one["seen"] < _LATELY_S
-                and print_["rested"] > one["seen"] - _JUST_S
-                and math.hypot(print_["x"] - one["x"], print_["y"] - one["y"]) < _STEPS_M
-                for one in self._bodies
-            )
-        )
+        return any(t - one["seen"] < _LATELY_S for one in self._near(print_, bodies))
+
+    def standing(self, print_: Any, bodies: Any) -> Any:
+        """Who of them most probably stands on the print, and nobody else does: or None."""
+        seen = bodies[(bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == 0)]
+        beside = np.hypot(seen["x"] - print_["x"], seen["y"] - print_["y"]) < _BESIDE_M
+        if print_["width"] < _EDGE_M or beside.any():
+            return None
+        return min(self._near(print_, bodies), key=lambda one: _away(print_, one), default=None)
+
+    def found(self, body: Any) -> None:
+        """This one of them is there again."""
+        self._bodies = [one for one in self._bodies if one is not body]
+
+    def _near(self, print_: Any, bodies: Any) -> list[Any]:
+        """Of those who have not turned up: beside whose place the print came since; none if it is hardly a foot."""
+        in_view = print_["whole"] == print_["hits"] and print_["width"] < _SIDE_M
+        if in_view or thin(print_) or has_left(print_, bodies):
+            return []
+        came = [one for one in self._bodies if print_["rested"] > one["seen"] - _JUST_S]
+        return [one for one in came if _away(print_, one) < _STEPS_M]
 
     def gone(self, t: float) -> list[FloorEvent]:
         """Those who did not turn up."""
@@ -142,3 +156,7 @@ class Absent:
             events += [Vanished(t, int(one["label"]), float(one["seen"]), t) for one in late]
             lost[:] = [one for one in lost if t - one["seen"] <= wait_s]
         return events
+
+
+def _away(print_: Any, one: Any) -> float:
+    return math.hypot(print_["x"] - one["x"], print_["y"] - one["y"])

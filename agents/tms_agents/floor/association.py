@@ -15,6 +15,7 @@ from tms_agents.floor.bodies import begin, predict
 from tms_agents.floor.build import agree
 from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
+from tms_agents.floor.left_feet import put
 from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.masks import joined
 from tms_agents.floor.nobodys import goes_on, known, nobodys, spanned
@@ -336,6 +337,14 @@ class Association:
                 new[name] = footprint["hits"]
         everywhere["footprint"][:, index] = number
         return index
+
+    def stand(self, prints: Any, i: int, t: float) -> int:
+        """Somebody new stands on the print i: which mover that is; -1 where there is no room for one."""
+        free = np.flatnonzero(~self.hypotheses["used"].any(axis=0))
+        if not free.size:
+            return -1
+        put(self.hypotheses, int(free[0]), prints, i, t)
+        return int(free[0])
 
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""

@@ -168,11 +168,11 @@ class FloorEstimator:
             lambda body: self._furniture.was(body, float(body["far"]), self._pieces(t)),
             learned=view.background.learned,
         )
-        self._association.settle()
         appeared: list[FloorEvent] = []
         if view.background.learned:
             for index, kind in objects.ripe(prints, bodies, t, scattered):
                 appeared += self._settle(index, kind, t)
+        self._association.settle()
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared
 
@@ -180,7 +180,7 @@ class FloorEstimator:
         return [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]
 
     def _settle(self, index: int, kind: int, t: float) -> list[FloorEvent]:
-        """A print rests: it is an object or furniture."""
+        """A print rests: it is an object or furniture, or somebody who is waited for stands on it."""
         q = self._prints[index]
         x, y = float(q["x"]), float(q["y"])
         if self._masks.outside(x, y) or (kind == OBJECT and self._objects.at(q)):
@@ -198,7 +198,11 @@ class FloorEstimator:
         edge = q["width"] < _EDGE_M or q["whole"] < 0.8 * q["hits"]
         sliver = (q["attached"] > 0.02 and edge) or (q["beams"] < 2.0 and not q["given"])
         unsettled = sliver and started < self._settings.learn_s + _UNSETTLED_S
-        if unsettled or (not q["given"] and self._tracks.absent.stands(q, self._tracks.bodies, t)):
+        if unsettled:
+            return []
+        if back := self._tracks.turns_up(self._prints, index, t):
+            return back
+        if not q["given"] and self._tracks.absent.stands(q, self._tracks.bodies, t):
             return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED

@@ -32,6 +32,8 @@ _FOOT_M, _BEAMS = 0.1, 8
 _TELLS = 5.0
 #: Who had stood there for so long (s) stays for so long (s): the passer is still beside him.
 _ROOTED_S, _HELD_S = 10.0, 3.0
+#: Who is put on a print has so much longer (s) to show that it is his foot, and stays there for so long (s).
+_PROVES_S, _STAYS_S = 3.0, 8.0
 
 
 @njit(cache=True)
@@ -133,6 +135,18 @@ def _stand(body: Any, prints: Any, i: int, j: int, t: float) -> None:
     body.held = t + _HELD_S if t - p.rested > _ROOTED_S else -1e9
 
 
+@njit(cache=True)
+def _put(everywhere: Any, b: int, prints: Any, i: int, t: float, scratch: Any) -> None:
+    p, c = prints[i], scratch[0]
+    c.x, c.y, c.width, c.gap, c.n = p.x, p.y, p.width, np.inf, _BEAMS
+    for h in range(everywhere.shape[0]):
+        body = everywhere[h, b]
+        begin(body, c, i, t)
+        _stand(body, prints, i, -1, t)
+        body.held, body.lone = t + _STAYS_S, -_PROVES_S
+    p.owner, p.idle = b, 0.0
+
+
 _SCRATCH = np.zeros(1, CLUSTER)
 
 
@@ -140,3 +154,8 @@ def take_back(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
     """Put those of ``bodies`` (n,) whose feet stand where they stood back on these ``prints``: how many there are."""
     count: int = _take_back(bodies, prints, t, scattered, _SCRATCH)
     return count
+
+
+def put(everywhere: Any, index: int, prints: Any, i: int, t: float) -> None:
+    """Somebody new, the body at ``index`` in all hypotheses (h, n), stands on the print i; his other foot is hidden."""
+    _put(everywhere, index, prints, i, t, _SCRATCH)

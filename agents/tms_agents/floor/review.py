@@ -14,6 +14,7 @@ from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vaca
 from tms_agents.floor.lone import count_lone, has_come, has_walked
 from tms_agents.floor.masks import distance
 from tms_agents.floor.norm import norm
+from tms_agents.floor.pair import is_pair
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ _QUALITY = 0.3
 _KNOWN = 200
 #: Who is believed was seen so often, and in this share of the scans that should have shown him.
 _HITS, _STEADY = 4.0, 0.6
+#: Of who is believed every sighting looks so much like feet (`footlike`), in the mean.
+_LIKELY = 0.45
 #: Who walks is believed after so long (s), or never.
 _UNSURE_S = 6.0
 #: Where somebody began looks free, or he still stands there, within this (m).
@@ -178,7 +181,8 @@ def review(
             age = body.seen - body.first
             parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
             stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
-            if unseen > 0.45 or stays or parked or body.hits < 0.5 * body.looks - 1.0:
+            pair = stays and is_pair(body, t)
+            if unseen > 0.45 or (stays and not pair) or parked or body.hits < 0.5 * body.looks - 1.0:
                 body.used = 0
                 continue
             if unseen > 0.0:
@@ -197,8 +201,11 @@ def review(
                     # One foot of somebody there is not seen now: this may be it.
                     if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
                         halved = True
-            if part:
+            if part or (pair and (halved or not learned or body.score < _LIKELY * body.hits)):
                 body.used = 0
+                continue
+            if pair:
+                actions[b] = CONFIRM
                 continue
             needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
             needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
@@ -210,7 +217,7 @@ def review(
                 # Furniture that is pushed aside looks like a robot at first.
                 needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
             steady = body.hits >= max(_HITS, _STEADY * body.due)
-            if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, 0.45 * body.hits):
+            if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, _LIKELY * body.hits):
                 came = _has_come(body, t, ranges, longest, pose, first, step)
                 actions[b] = CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
             continue

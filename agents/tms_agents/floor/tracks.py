@@ -14,6 +14,7 @@ from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.lone import has_walked
 from tms_agents.floor.masks import Area
+from tms_agents.floor.pair import is_pair
 from tms_agents.floor.place import place, tell
 from tms_agents.floor.review import (
     BACK,
@@ -57,8 +58,8 @@ _OUTSIDE_M, _INSIDE_M = 0.1, 0.05
 #: Who would be so near (m) a seat as he went sits on it, this far (m) from its edge: for certain, if his feet have
 #: vanished in clear view for so long (s).
 _INTO_M, _DEEP_M, _CLEAR_S = 0.2, 0.25, 0.3
-#: A foot that leaves lands so far away (m) within so long (s).
-_STRIDE_M, _STEPS_S = 1.2, 0.6
+#: A foot that leaves lands so far away (m) within so long (s); one that was hidden for longer (s) has not left.
+_STRIDE_M, _STEPS_S, _HIDES_S = 1.2, 0.6, 5.0
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
 _SHIFT_M, _BY_ITSELF_S, _HITS = 0.35, 2.0, 5
 
@@ -138,6 +139,17 @@ class Tracks:
     def labels(self, t: float) -> list[FloorLabel]:
         """The movers there are."""
         return [_label(body, t) for body in self.bodies if body["used"] and body["confirmed"]]
+
+    def turns_up(self, prints: Any, i: int, t: float) -> list[FloorEvent]:
+        """Who is waited for stands on the print i, it seems: then he is back."""
+        old = self.absent.standing(prints[i], self.bodies)
+        index = -1 if old is None else self._association.stand(prints, i, t)
+        if index < 0:
+            return []
+        self.absent.found(old)
+        self.bodies[index]["confirmed"] = 1
+        self._go_on(index, old)
+        return [Back(t, *self._tell(index, t)[:2])]
 
     def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
         """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
@@ -345,6 +357,9 @@ class Tracks:
                     continue
                 x, y, seen = lost
             since = max(0.0, float(body["first"]) - seen)
+            if steps and since > _HIDES_S and is_pair(body, float(body["seen"])):
+                # Who stands and hides one foot for so long stands on; these are somebody else's.
+                continue
             gap = math.hypot(body["x0"] - x, body["y0"] - y)
             reach = _OUT_M + min(_SPEED * since, 1.2)
             if steps and since < _STEPS_S:

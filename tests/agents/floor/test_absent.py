@@ -25,6 +25,14 @@ def person(x: float, y: float, *, label: int = 1, seen: float = 10.0, first: flo
     return body
 
 
+def print_at(x: float, rested: float):
+    """As wide as a leg, a part of which is hidden now and then."""
+    (print_,) = empty(PRINT, 1)
+    print_["x"], print_["y"], print_["rested"], print_["width"] = x, 4.0, rested, 0.1
+    print_["hits"], print_["whole"] = 30, 20
+    return print_
+
+
 @pytest.fixture
 def absent() -> Absent:
     return Absent(Area([DOOR]), Area([ROOM]))
@@ -165,20 +173,21 @@ def test_what_came_where_somebody_was_lost_may_be_his_foot_for_a_while(
     absent: Absent, away: float, since: float, now: float, stands: bool
 ) -> None:
     absent.keep(person(4.0, 4.0))
-    (print_,) = empty(PRINT, 1)
-    print_["x"], print_["y"], print_["rested"] = 4.0 + away, 4.0, since
+    print_ = print_at(4.0 + away, since)
     assert absent.stands(print_, empty(BODY, 1), now) == stands
 
 
-@pytest.mark.parametrize(("width", "whole", "stands"), [(0.1, 30, True), (0.05, 30, False), (0.05, 5, True)])
-def test_what_is_thinner_than_a_foot_is_none_of_who_was_lost(
+@pytest.mark.parametrize(
+    ("width", "whole", "stands"),
+    [(0.1, 20, True), (0.1, 30, False), (0.2, 30, True), (0.05, 20, False), (0.05, 5, True)],
+    ids=["hidden now and then", "never hidden", "a shoe", "too thin", "a part"],
+)
+def test_what_is_in_full_view_or_thin_is_no_foot_of_who_was_lost(
     absent: Absent, width: float, whole: int, stands: bool
 ) -> None:
-    """If all of it is seen."""
     absent.keep(person(4.0, 4.0))
-    (print_,) = empty(PRINT, 1)
-    print_["x"], print_["y"], print_["rested"] = 4.5, 4.0, 12.0
-    print_["width"], print_["hits"], print_["whole"] = width, 30, whole
+    print_ = print_at(4.5, 12.0)
+    print_["width"], print_["whole"] = width, whole
     assert absent.stands(print_, empty(BODY, 1), 12.0) == stands
 
 
@@ -187,8 +196,45 @@ def test_what_somebody_else_stood_on_and_has_left_is_no_foot_of_who_was_lost(
     absent: Absent, whose: int, both_seen: bool, may_stand: bool
 ) -> None:
     absent.keep(person(4.0, 4.0))
-    bodies, print_ = empty(BODY, 1), empty(PRINT, 1)[0]
+    bodies, print_ = empty(BODY, 1), print_at(4.2, 12.0)
     bodies[0] = person(5.5, 4.0, label=5, seen=14.0)
     bodies["a_seen"], bodies["b_seen"] = 14.0, 14.0 if both_seen else 12.0
-    print_["x"], print_["y"], print_["rested"], print_["whose"] = 4.2, 4.0, 12.0, whose
+    print_["whose"] = whose
     assert absent.stands(print_, bodies, 12.0) == may_stand
+
+
+@pytest.mark.parametrize(
+    ("x", "rested", "width", "other", "label"),
+    [
+        (4.4, 30.0, 0.1, {}, 1),
+        (4.6, 30.0, 0.1, {}, 2),
+        (4.4, 3.0, 0.1, {}, None),
+        (9.0, 30.0, 0.1, {}, None),
+        (4.4, 30.0, 0.01, {}, None),
+        (4.4, 30.0, 0.1, {"x": 4.8}, None),
+        (4.4, 30.0, 0.1, {"x": 4.8, "stale": CONCEALED}, 1),
+        (4.4, 30.0, 0.1, {"x": 4.8, "confirmed": 0}, 1),
+    ],
+    ids=["the nearer", "the other", "before", "far away", "an edge", "beside one", "who is hidden", "not believed"],
+)
+def test_who_stands_on_what_is_left(
+    absent: Absent, x: float, rested: float, width: float, other: dict[str, float], label: int | None
+) -> None:
+    """However long ago he was lost."""
+    absent.keep(person(4.0, 4.0, label=1))
+    absent.keep(person(5.0, 4.0, label=2))
+    print_ = print_at(x, rested)
+    print_["width"] = width
+    bodies = empty(BODY, 1)
+    bodies[0] = person(1.0, 4.0, label=3)
+    for name, value in other.items():
+        bodies[name] = value
+    found = absent.standing(print_, bodies)
+    assert (found and int(found["label"])) == label
+
+
+def test_who_is_found_is_waited_for_no_more(absent: Absent) -> None:
+    absent.keep(person(4.0, 4.0, label=1))
+    absent.keep(person(5.0, 4.0, label=2))
+    absent.found(absent.standing(print_at(4.4, 30.0), empty(BODY, 1)))
+    assert absent.gone(1e6) == [Vanished(1e6, 2, 10.0, 1e6)]
