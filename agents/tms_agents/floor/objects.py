@@ -132,7 +132,7 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float)
     """
     if q.given:
         return False
-    if robots and q.covered > _COVERED * q.hits and t - q.first < _PARKS_S:
+    if robots and q.covered > _COVERED * q.hits and t - q.rested < _PARKS_S:
         return True
     if t - q.first > _STANDS_S:
         return False

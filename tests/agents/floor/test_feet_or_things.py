@@ -89,6 +89,16 @@ def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
     assert told(resting(8.0, covered=81, given=1), robots=True)
 
 
+@pytest.mark.parametrize(("seconds", "known"), [(50.0, False), (70.0, True)])
+def test_what_lies_behind_something_for_a_minute_is_no_part_of_a_robot_though_people_pass(
+    seconds: float, known: bool
+) -> None:
+    """Whoever passes hides it for a moment: it is where it was when it comes out again."""
+    prints = resting(seconds, covered=round(10 * seconds), busy=NOW - 15.0)
+    prints["first"] = NOW - 10.0
+    assert told(prints, robots=True) == known
+
+
 @pytest.mark.parametrize(("whole", "known"), [(20, True), (5, False)])
 def test_what_a_hand_put_in_full_view_is_no_part_of_a_robot(whole: int, known: bool) -> None:
     """It is told before somebody, or the robot, stands before it."""
