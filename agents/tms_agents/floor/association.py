@@ -324,10 +324,9 @@ class Association:
         away = np.hypot(everywhere["x"] - footprint["x"], everywhere["y"] - footprint["y"])
         everywhere["used"][(everywhere["confirmed"] == 0) & (away < footprint["a"] + _BEGAN_M)] = 0
         if index < 0:
-            free = np.flatnonzero(~everywhere["used"].any(axis=0))
-            if not free.size:
+            index = self._free()
+            if index < 0:
                 return -1
-            index = int(free[0])
             for bodies in everywhere:
                 begin(bodies[index], BLANK[0], -1, t)
             new = everywhere[:, index]
@@ -340,11 +339,15 @@ class Association:
 
     def stand(self, prints: Any, i: int, t: float) -> int:
         """Somebody new stands on the print i: which mover that is; -1 where there is no room for one."""
+        index = self._free()
+        if index >= 0:
+            put(self.hypotheses, index, prints, i, t)
+        return index
+
+    def _free(self) -> int:
+        """The first that is nobody in any hypothesis; -1: none."""
         free = np.flatnonzero(~self.hypotheses["used"].any(axis=0))
-        if not free.size:
-            return -1
-        put(self.hypotheses, int(free[0]), prints, i, t)
-        return int(free[0])
+        return int(free[0]) if free.size else -1
 
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""
