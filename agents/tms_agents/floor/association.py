@@ -342,6 +342,8 @@ class Association:
         index = self._free()
         if index >= 0:
             put(self.hypotheses, index, prints, i, t)
+            # Nobody was there in any hypothesis: what is found of the new one is so in all.
+            self._before[index] = self._raw[0][index]
         return index
 
     def _free(self) -> int:

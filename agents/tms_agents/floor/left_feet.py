@@ -139,11 +139,12 @@ def _stand(body: Any, prints: Any, i: int, j: int, t: float) -> None:
 def _put(everywhere: Any, b: int, prints: Any, i: int, t: float, scratch: Any) -> None:
     p, c = prints[i], scratch[0]
     c.x, c.y, c.width, c.gap, c.n = p.x, p.y, p.width, np.inf, _BEAMS
-    for h in range(everywhere.shape[0]):
-        body = everywhere[h, b]
-        begin(body, c, i, t)
-        _stand(body, prints, i, -1, t)
-        body.held, body.lone = t + _STAYS_S, -_PROVES_S
+    body = everywhere[0, b]
+    begin(body, c, i, t)
+    _stand(body, prints, i, -1, t)
+    body.held, body.lone = t + _STAYS_S, -_PROVES_S
+    for h in range(1, everywhere.shape[0]):
+        everywhere[h, b] = body
     p.owner, p.idle = b, 0.0
 
 

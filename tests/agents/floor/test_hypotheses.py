@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor.association import Association
-from tms_agents.floor.state import BODY
+from tms_agents.floor.state import BODY, PRINT, empty
 
 _KEPT, _BODIES = 4, 6
 
@@ -38,6 +38,21 @@ def test_what_is_found_of_somebody_is_so_wherever_he_is_the_same() -> None:
     assert association._count == _KEPT
     assert hypotheses["stale"][:_KEPT, 0].tolist() == [1, 1, 1, 0]
     assert hypotheses["stale"][:_KEPT, 1].tolist() == [1, 0, 0, 0]
+
+
+def test_who_is_put_on_a_print_stands_there_in_all_of_them() -> None:
+    association, hypotheses = _association()
+    hypotheses["shine"][:, 3] = np.arange(len(hypotheses))
+    prints = empty(PRINT, 1)
+    prints["used"], prints["x"], prints["owner"] = 1, 4.0, -1
+    association.mark()
+    index = association.stand(prints, 0, 9.0)
+    association.bodies["confirmed"][index], association.bodies["label"][index] = 1, 8
+    association.named(index, (4.0, 0.0))
+    association.settle()
+    assert association._count == _KEPT
+    assert all(hypotheses[h, index] == hypotheses[0, index] for h in range(_KEPT))
+    assert (index, hypotheses["label"][1, index], hypotheses["x"][1, index]) == (3, 8, 4.0)
 
 
 def test_how_somebody_looked_since_the_last_doubt_is_a_matter_of_the_doubt() -> None:
