@@ -39,6 +39,8 @@ SHOD = 0.2
 #: Where so many feet were seen, and at most or at least such a share was as wide as a shoe, all show the same: legs, or
 #: shoes, also those who stand and point at the laser.
 _PLENTY, _ALL_LEGS, _ALL_SHOES = 150.0, 0.1, 0.45
+#: Of so many feet at least so few were as wide as a shoe that they are legs: of simulated shoes 0.3 are, at least.
+_FEW, _NO_SHOE = 50.0, 0.05
 #: The toes and the heel of a shoe are that wide, as a share of its length (`sole`); both are in view if it looks so
 #: wide (m), and it points along the way (sine of the angle).
 _TOES, _SIDE_M, _ASTRAY = 0.3, 0.19, 0.5
@@ -131,6 +133,12 @@ def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, sho
             if of[i] >= 0 and not c.cut and (body.a_print == of[i] or body.b_print == of[i]):
                 shoes[1] = min(shoes[1] + 1.0, _LONG)
                 shoes[0] += ((1.0 if _SHOE_M[0] < c.width < _SHOE_M[1] else 0.0) - shoes[0]) / shoes[1]
+
+
+@njit(cache=True)
+def only_legs(shoes: NDArray[np.float64]) -> bool:
+    """Whether no shoe was seen among the feet here; ``shoes`` (2,) is what `count_shoes` learns."""
+    return bool(shoes[1] >= _FEW and shoes[0] < _NO_SHOE)
 
 
 @njit(cache=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import FOREGROUND
-from tms_agents.floor.build import count_shoes, legs
+from tms_agents.floor.build import count_shoes, legs, only_legs
 from tms_agents.floor.dark import dark_width
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.footprints import Footprints
@@ -166,7 +166,9 @@ class FloorEstimator:
             view.sight,
             self._new_label,
             lambda body: self._furniture.was(body, float(body["far"]), self._pieces(t)),
+            lambda body: self._furniture.misses(float(body["width"]), float(body["rest_at"]), self._pieces(t)),
             learned=view.background.learned,
+            legs=only_legs(self._shoes),
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:

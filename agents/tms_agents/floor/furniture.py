@@ -31,6 +31,8 @@ _TOGETHER_S, _LEGS_M = 2.0, 0.2
 _LIFTED_S = 1.0
 #: Legs that came so long ago (s) at most tell of one that is believed later; so near (m) it is the same leg.
 _LEGS_S, _SAME_LEG_M = 60.0, 0.05
+#: What rests somewhere looks like a piece that has gone if it is as wide, but for this share.
+_ALIKE = 0.1
 #: The ranges of one surface differ so little from beam to beam (m); something thin hides so much of it (m).
 _SAME_M, _HIDDEN_M = 0.05, 0.15
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
@@ -203,6 +205,12 @@ class Furniture:
             and abs(piece.t - begun["first"]) < _GROUP_S
             for piece in pieces
         )
+
+    @staticmethod
+    def misses(width: float, rests_at: float, pieces: list[Piece]) -> bool:
+        """Whether one of the ``pieces``, about so wide (m), had gone when what is so wide came to rest."""
+        gone = [piece for piece in pieces if piece.whole and piece.t < rests_at + _EARLY_S]
+        return any(abs(piece.width - width) < _ALIKE * width for piece in gone)
 
     @staticmethod
     def _grouped(piece: Piece, pieces: list[Piece], thin: float) -> bool:

@@ -18,12 +18,15 @@ from tms_agents.floor.pair import is_pair
 
 Array = NDArray[np.float64]
 
-#: What `review` finds of a body; one that has moved and is broad, and new, may be furniture that is pushed.
-NOTHING, CONFIRM, LOST, BACK, GONE, MOVED, BROAD = 0, 1, 2, 3, 4, 5, 6
+#: What `review` finds of a body; one that has moved and is broad, and new, may be furniture that is pushed; one that
+#: rests and shows one broad thing alone may be a piece of it; what is no feet is a thing, whoever it was.
+NOTHING, CONFIRM, LOST, BACK, GONE, MOVED, BROAD, PIECE, THING = 0, 1, 2, 3, 4, 5, 6, 7, 8
 #: What is new for so long (s) may turn out to be furniture.
 _NEW_S = 30.0
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
+#: No leg is broader (m).
+LEG_M = 0.2
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
 #: Who has not come from elsewhere on two feet, and rests for so long (s), is a thing.
@@ -31,6 +34,9 @@ _INERT_S = 30.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
+#: Where legs are seen, two side by side are hardly ever so broad (m) in the mean while somebody stands; what is no
+#: narrower than this (m) may be furniture, and is looked at when it has rested for so long (s).
+_SIDE_BY_SIDE_M, _PIECE_M, _SETTLED_S = 0.26, 0.18, 8.0
 #: What moved with people beside it for this share of its way may have been pushed.
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
@@ -85,15 +91,20 @@ def _has_come(body: Any, t: float, ranges: Array, longest: Array, pose: Array, f
 
 
 @njit(cache=True)
-def _is_parked(body: Any, t: float) -> bool:
-    """Whether it is as wide as furniture, has never gone far by itself, and stands still."""
+def _is_parked(body: Any, t: float, legs: bool) -> bool:
+    """Whether it is as wide as furniture, has never gone far by itself, and stands still.
+
+    Where people show ``legs`` nobody stands who is so broad.
+    """
     if body.machine:
         return False
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
         return bool(t - since > _PARKED_S)
+    if legs and body.width > _SIDE_BY_SIDE_M and t - body.rest_at > 2.0 * _PARKED_S:
+        return True
     inert = t - body.rest_at > _INERT_S and not body.robot and not has_come(body)
-    if inert and not has_walked(body) and not _is_known(body):
+    if inert and not is_somebody(body):
         return True
     if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
         # It came by itself.
@@ -102,6 +113,20 @@ def _is_parked(body: Any, t: float) -> bool:
     rests = t - body.rest_at
     broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
     return bool((broad and rests > _PARKED_S) or (is_footless(body) and rests > 2.0 * _PARKED_S))
+
+
+@njit(cache=True)
+def _is_piece(body: Any, t: float) -> bool:
+    """Whether all that is seen of it is one thing that rests, broad enough for a piece of furniture."""
+    one = body.a_print == body.b_print or max(t - body.a_seen, t - body.b_seen) > 1.0
+    rests = t - body.rest_at > _SETTLED_S
+    return bool(one and rests and body.width > _PIECE_M and not body.robot and not body.machine)
+
+
+@njit(cache=True)
+def is_somebody(body: Any) -> bool:
+    """Whether it is a person for certain: if what is seen now is none, he is somewhere else."""
+    return bool(_is_known(body) or has_walked(body))
 
 
 @njit(cache=True)
@@ -163,15 +188,19 @@ def review(
     actions: NDArray[np.int64],
     inside: bool,
     learned: bool,
+    legs: bool,
 ) -> None:
-    """What is due for each body, into ``actions``; drops tentative ones that came to nothing."""
+    """What is due for each body, into ``actions``; drops tentative ones that came to nothing.
+
+    ``legs``: it is known that people show legs here, not shoes.
+    """
     for b in range(bodies.size):
         body = bodies[b]
         actions[b] = NOTHING
         if not body.used:
             continue
         unseen = t - body.seen
-        broad = body.wide > 0.3 or body.far > _FAR_M or body.from_furniture == 1
+        broad = body.wide > 0.3 or body.far > (_FAR_M if body.confirmed else LEG_M) or body.from_furniture == 1
         if broad and unseen == 0.0 and norm(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
         if unseen == 0.0 and norm(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
@@ -179,7 +208,8 @@ def review(
         if not body.confirmed:
             way = norm(body.x - body.x0, body.y - body.y0)
             age = body.seen - body.first
-            parked = body.from_furniture == 1 and t - body.rest_at > _PARKED_S
+            furniture = body.from_furniture == 1 or body.pushed > _BESIDE
+            parked = furniture and t - body.rest_at > _PARKED_S
             stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
             pair = stays and is_pair(body, t)
             if unseen > 0.45 or (stays and not pair) or parked or body.hits < 0.5 * body.looks - 1.0:
@@ -228,11 +258,12 @@ def review(
             if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
                 # One thing that does not move is no person: whoever it was is somewhere else.
                 actions[b] = LOST
-            elif body.quality < _QUALITY or misled(body) or _is_parked(body, t):
-                # Somebody who is known for long has gone on from there.
-                actions[b] = LOST if _is_known(body) or has_walked(body) else GONE
+            elif body.quality < _QUALITY or misled(body) or _is_parked(body, t, legs):
+                actions[b] = THING
             elif body.stale:
                 actions[b] = BACK
+            elif int(t) > int(t - dt) and _is_piece(body, t):
+                actions[b] = PIECE
             elif norm(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
                 new = t - body.first < _NEW_S and body.from_furniture == 0
                 actions[b] = BROAD if new and (body.wide > 0.5 or is_footless(body)) else MOVED

@@ -21,10 +21,15 @@ from tms_agents.floor.review import (
     BROAD,
     CONFIRM,
     GONE,
+    LEG_M,
     LOST,
+    MOVED,
     NOTHING,
+    PIECE,
+    THING,
     doubled,
     is_footless,
+    is_somebody,
     outside,
     review,
     unseen,
@@ -39,6 +44,9 @@ _DOUBTED = 0.5
 _PIECE_M = 0.25
 #: What is pushed is left within this (m).
 _PUSHED_M = 2.0
+#: Two shoes side by side are broader (m) for a moment only. What has moved with somebody beside it for this share of
+#: the way, lately above all, may be pushed by him.
+_SHOES_M, _PUSHED = 0.33, 0.2
 #: What has moved with people beside it for less than this share of the way has moved by itself.
 _ALONE = 0.3
 #: A seated person's feet vanish so near the seat (m), and those of somebody who goes where nobody is looked for.
@@ -86,12 +94,15 @@ class Tracks:
         sight: tuple[Any, ...],
         new_label: Callable[[], int],
         was_furniture: Callable[[Any], bool],
+        is_furniture: Callable[[Any], bool],
         *,
         learned: bool,
+        legs: bool = False,
     ) -> list[FloorEvent]:
         """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes.
 
-        ``was_furniture`` tells of a body whether a piece of background has gone from where it began.
+        ``was_furniture`` tells of a body whether a piece of background has gone from where it began, ``is_furniture``
+        whether one that looks like it has gone. ``legs``: it is known that people show legs here.
         """
         s = self._settings
         judge: Any = review
@@ -108,6 +119,7 @@ class Tracks:
             self._actions,
             bool(self._region.polygons),
             learned,
+            legs,
         )
         self._see_off(t)
         self._believe_steps(t)
@@ -117,7 +129,10 @@ class Tracks:
             if action == NOTHING:
                 continue
             body = self.bodies[index]
-            if action == GONE:
+            if action == THING or (action == PIECE and is_furniture(body)):
+                # Somebody who is known for long has gone on from there.
+                events += self._lost(index, t, thing=True) if is_somebody(body) else self._gone(index, t)
+            elif action == GONE:
                 events += self._gone(index, t)
             elif action == LOST:
                 events += self._lost(index, t)
@@ -126,13 +141,15 @@ class Tracks:
                 label, xy, _ = self._tell(index, t)
                 events.append(Back(t, label, xy))
             elif action == CONFIRM:
-                events += self._confirm(index, t, new_label, was_furniture)
+                missing = self._missing(body)
+                if not self._is_pushed(body, missing, legs):
+                    events += self._confirm(index, missing, t, new_label, was_furniture)
             elif action == BROAD and (body["pushed"] > 0.8 or was_furniture(body)):
                 # Furniture that is pushed is seen to be missing only when the one who pushes has left its place.
                 self._association.decide(index)
                 body["confirmed"], body["from_furniture"], body["robot"] = 0, 1, 0
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
-            else:
+            elif action in (MOVED, BROAD):
                 events.append(Moved(t, *self._tell(index, t)))
         return events
 
@@ -207,7 +224,8 @@ class Tracks:
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
         return events
 
-    def _lost(self, index: int, t: float) -> list[FloorEvent]:
+    def _lost(self, index: int, t: float, *, thing: bool = False) -> list[FloorEvent]:
+        """The mover is not there; what is seen of it now, if anything, is somebody else's foot, or a ``thing``."""
         body = self.bodies[index]
         if body["stale"]:
             return []
@@ -226,7 +244,7 @@ class Tracks:
         if body["seen"] == t:
             # What is seen is something else.
             self._association.decide(index)
-            if (new := began(self.bodies, body)) >= 0:
+            if (new := began(self.bodies, body, thing)) >= 0:
                 return self._merge(index, new, t)
             body["a_print"] = body["b_print"] = -1
             body["a_seen"] = body["b_seen"] = -1e9
@@ -280,8 +298,14 @@ class Tracks:
         return not self._gates.polygons or self._gates.distance(*out) < _DOOR_M
 
     def _confirm(
-        self, index: int, t: float, new_label: Callable[[], int], was_furniture: Callable[[Any], bool]
+        self,
+        index: int,
+        missing: int | None,
+        t: float,
+        new_label: Callable[[], int],
+        was_furniture: Callable[[Any], bool],
     ) -> list[FloorEvent]:
+        """The mover at ``index`` is believed: who is ``missing``, if anybody is, or somebody new."""
         body = self.bodies[index]
         if self._region.polygons and self._region.distance(float(body["x"]), float(body["y"])) > _INSIDE_M:
             return []
@@ -299,7 +323,6 @@ class Tracks:
         if robot and body["from_furniture"] == 0 and body["pushed"] < _ALONE:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
-        missing = self._missing(body)
         if missing is None and not is_footless(body):
             missing = self.absent.rises(self.bodies, body, self._association.scattered)
         old = None
@@ -319,6 +342,16 @@ class Tracks:
             suspect(self.bodies, index, t)
         label, xy, cov = self._tell(index, t)
         return [Appeared(t, label, "mover", xy, cov, robot, float(body["first"]), (), float(body["width"]))]
+
+    def _is_pushed(self, body: Any, missing: int | None, legs: bool) -> bool:
+        """Whether it is broader than a foot, began where nobody comes in, and somebody goes beside it.
+
+        It is furniture, unless a robot is ``missing``; if not, he who goes beside it leaves it some time.
+        """
+        if body["footprint"] or (missing is not None and self.bodies[missing]["robot"]):
+            return False
+        broad = body["far"] > (LEG_M if legs else _SHOES_M)
+        return bool(broad and body["pushed"] > _PUSHED and self.absent.inside(body))
 
     def _go_on(self, index: int, old: Any) -> None:
         """The mover at ``index`` is who the ``old`` body was, which is no more."""

@@ -41,9 +41,12 @@ def suspected(body: Any) -> bool:
     return bool(land < body.suspected + _PUT_S)
 
 
-def began(bodies: Any, body: Any) -> int:
-    """Which of ``bodies`` (n,) is who the body was, if it is `suspected` to be a thing now; -1: none."""
-    if not suspected(body):
+def began(bodies: Any, body: Any, thing: bool) -> int:
+    """Which of ``bodies`` (n,) is who the body was, if it is `suspected` to be a thing now; -1: none.
+
+    A ``thing`` for certain may have been moved since.
+    """
+    if not (thing or suspected(body)):
         return -1
     there = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["label"] > body["label"])
     found = np.flatnonzero(there & (bodies["first"] == body["suspected"]))

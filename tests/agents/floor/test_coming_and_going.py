@@ -21,7 +21,7 @@ from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.masks import Area, Masks, joined
 from tms_agents.floor.missing import missed
 from tms_agents.floor.nobodys import costs
-from tms_agents.floor.review import CONFIRM, GONE, NOTHING, review
+from tms_agents.floor.review import CONFIRM, NOTHING, THING, review
 from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
 from tms_agents.floor.state import BODY, PRINT, empty
 from tms_agents.floor.tracks import Tracks
@@ -40,7 +40,7 @@ def tracks(gates: list[list[tuple[float, float]]], region: list[tuple[float, flo
 
 def at(one: Tracks, t: float) -> list:
     """What happens at t, where nothing is seen."""
-    return one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    return one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, lambda body: False, learned=True)
 
 
 def walker(body: np.ndarray, x: float, y: float, v: tuple[float, float], seen: float) -> None:
@@ -151,7 +151,7 @@ def happens(one: Tracks, sight: tuple, seconds: float) -> list[type]:
     return [
         type(event)
         for t in times
-        for event in one.review(float(t), 0.1, sight, lambda: 9, lambda body: False, learned=True)
+        for event in one.review(float(t), 0.1, sight, lambda: 9, lambda body: False, lambda body: False, learned=True)
     ]
 
 
@@ -191,20 +191,20 @@ def test_who_is_hidden_does_not_go_on_through_a_wall() -> None:
 
 
 @pytest.mark.parametrize(
-    ("steps", "feet", "x0", "gone"),
+    ("steps", "feet", "x0", "thing"),
     [(0, 0, 0.0, True), (0, 14, 3.0, True), (0, 14, 0.0, False), (0, 250, 3.0, False), (5, 40, 3.0, False)],
     ids=["no feet", "stays where it was", "comes", "shuffles", "walks"],
 )
 def test_what_rests_and_never_showed_two_feet_or_took_a_step_is_a_thing(
-    steps: int, feet: int, x0: float, gone: bool
+    steps: int, feet: int, x0: float, thing: bool
 ) -> None:
     """A bin that was pushed is as wide as two feet side by side, and has none. Who shuffles takes no steps."""
     bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
     walker(bodies[0], 3.0, 0.0, (0.0, 0.0), NOW)
     bodies["own_pace_n"], bodies["both"], bodies["rest_at"], bodies["rest_x"] = steps, feet, NOW - 31.0, 3.0
     bodies["x0"] = x0
-    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
-    assert (actions[0] == GONE) == gone
+    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+    assert (actions[0] == THING) == thing
 
 
 @pytest.mark.parametrize(("width", "his"), [(0.1, True), (0.37, False)], ids=["legs", "no feet"])
@@ -329,7 +329,7 @@ def test_who_is_believed_has_gone_from_where_he_began(there: float, believed: bo
     bodies["ax"] = bodies["bx"] = 3.0
     bodies["ay"] = bodies["by"] = 0.5
     ranges, states = scan(dict.fromkeys(range(45, 56), there) if there != 8.0 else {})
-    review(bodies, NOW, 0.1, ranges, states, *OPEN[2:], 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+    review(bodies, NOW, 0.1, ranges, states, *OPEN[2:], 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
     assert actions[0] == (CONFIRM if believed else NOTHING)
 
 
@@ -337,7 +337,7 @@ def test_what_is_not_believed_for_long_is_nobody() -> None:
     bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
     bodies["used"], bodies["hits"], bodies["looks"], bodies["score"] = 1, 70, 70, 20.0
     bodies["first"], bodies["seen"], bodies["x"] = NOW - 7.0, NOW, 0.3
-    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
     assert bodies["used"][0] == 0
 
 

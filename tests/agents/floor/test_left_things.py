@@ -95,5 +95,5 @@ def test_nobody_begins_with_a_foot_that_came_beside_somebody_and_has_never_moved
     if stepped:
         bodies["a_since"] = NOW - 1.0
     actions = np.zeros(2, np.int64)
-    review(bodies, NOW, 0.1, *COVERED, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+    review(bodies, NOW, 0.1, *COVERED, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
     assert actions[1] == action

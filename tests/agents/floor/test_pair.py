@@ -51,7 +51,7 @@ def stands(one: Tracks, seconds: float, *, learned: bool = True, both: bool = Tr
             if t > body["b_land"] and (body["confirmed"] == 0 or both):
                 body["b_seen"] = t
                 body["both"] += 1
-        yield from one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, learned=learned)
+        yield from one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, lambda body: False, learned=learned)
 
 
 @pytest.mark.parametrize(

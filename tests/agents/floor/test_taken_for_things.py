@@ -97,7 +97,7 @@ def found(bodies: np.ndarray, seconds: float, view: tuple = OPEN) -> list[int]:
     said = []
     for k in range(round(10 * seconds)):
         bodies["seen"] = bodies["a_seen"] = t = NOW + 0.1 * k
-        review(bodies, t, 0.1, *view, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+        review(bodies, t, 0.1, *view, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
         said.append(int(actions[0]))
     return said
 
@@ -215,7 +215,7 @@ def test_two_feet_at_one_place_are_one_thing(apart: float, odd: int, lost: bool)
     for k in range(60):
         bodies["seen"] = t = NOW + 0.1 * k
         bodies["a_seen" if k % 2 else "b_seen"] = t
-        review(bodies, t, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True)
+        review(bodies, t, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
         said.append(int(actions[0]))
     assert (LOST in said) == lost
 

@@ -52,7 +52,7 @@ def later(tracks: Tracks, seconds: float, *, both: bool) -> tuple[list, float]:
         if both:
             body["b_seen"], body["by"] = t, 0.25
             body["both"] += 1
-        if events := tracks.review(t, 0.1, OPEN, lambda: 9, lambda body: False, learned=True):
+        if events := tracks.review(t, 0.1, OPEN, lambda: 9, lambda body: False, lambda body: False, learned=True):
             return events, t - NOW
     return [], seconds
 

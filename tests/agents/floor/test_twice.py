@@ -24,7 +24,7 @@ def room(gates: list[list[tuple[float, float]]]) -> Tracks:
 
 def at(one: Tracks, t: float) -> list:
     """What happens at t, 0.1 s after the last scan."""
-    return one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, learned=True)
+    return one.review(t, 0.1, OPEN, lambda: 9, lambda body: False, lambda body: False, learned=True)
 
 
 def stander(body: np.void, since: float, **fields: float) -> None:
