@@ -36,7 +36,7 @@ _INERT_S = 30.0
 _BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
 #: Where legs are seen, two side by side are hardly ever so broad (m) in the mean while somebody stands; what is no
 #: narrower than this (m) may be furniture, and is looked at when it has rested for so long (s).
-_SIDE_BY_SIDE_M, _PIECE_M, _SETTLED_S = 0.26, 0.18, 8.0
+_SIDE_BY_SIDE_M, _BLOCK_M, _SETTLED_S = 0.26, 0.18, 8.0
 #: What moved with people beside it for this share of its way may have been pushed.
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
@@ -120,7 +120,7 @@ def _is_piece(body: Any, t: float) -> bool:
     """Whether all that is seen of it is one thing that rests, broad enough for a piece of furniture."""
     one = body.a_print == body.b_print or max(t - body.a_seen, t - body.b_seen) > 1.0
     rests = t - body.rest_at > _SETTLED_S
-    return bool(one and rests and body.width > _PIECE_M and not body.robot and not body.machine)
+    return bool(one and rests and body.width > _BLOCK_M and not body.robot and not body.machine)
 
 
 @njit(cache=True)
@@ -263,6 +263,7 @@ def review(
             elif body.stale:
                 actions[b] = BACK
             elif int(t) > int(t - dt) and _is_piece(body, t):
+                # Once a second: to look what has gone from the background takes longer than all of this.
                 actions[b] = PIECE
             elif norm(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
                 new = t - body.first < _NEW_S and body.from_furniture == 0

@@ -13,7 +13,6 @@ from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.lone import has_walked
-from tms_agents.floor.masks import Area
 from tms_agents.floor.pair import is_pair
 from tms_agents.floor.place import place, tell
 from tms_agents.floor.review import (
@@ -37,6 +36,7 @@ from tms_agents.floor.review import (
 from tms_agents.floor.settings import FloorSettings, Scene
 from tms_agents.floor.state import CONCEALED, SEATED
 from tms_agents.floor.twice import began, suspect
+from tms_agents.floor.whereabouts import Whereabouts
 
 #: How much what is seen next of somebody lost must look like feet.
 _DOUBTED = 0.5
@@ -49,23 +49,17 @@ _PUSHED_M = 2.0
 _SHOES_M, _PUSHED = 0.33, 0.2
 #: What has moved with people beside it for less than this share of the way has moved by itself.
 _ALONE = 0.3
-#: A seated person's feet vanish so near the seat (m), and those of somebody who goes where nobody is looked for.
-_SEAT_M, _MASK_M = 0.45, 0.5
-#: A foot is where it was seen so long (s) before the last one.
-_FOOT_S = 1.5
 #: Who has stayed where he is for so long (s) when he is hidden stands on, also in a door.
 _RESTS_S = 2.0
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
 _OUT_M, _SPEED = 0.5, 0.9
 #: Who has gone out of the room and is not seen for so long (s) has left.
 _THROUGH_S = 0.6
-#: Who is so near (m) is in a door. Of a way out of the room so many places are looked at.
-_DOOR_M, _SAMPLES = 0.3, 9
 #: Who is seen so far (m) outside the region has left the room; who comes is told when he is no farther (m) from it.
 _OUTSIDE_M, _INSIDE_M = 0.1, 0.05
-#: Who would be so near (m) a seat as he went sits on it, this far (m) from its edge: for certain, if his feet have
-#: vanished in clear view for so long (s).
-_INTO_M, _DEEP_M, _CLEAR_S = 0.2, 0.25, 0.3
+#: Who sits does so this far (m) from the edge of the seat, and for certain, if his feet have vanished in clear view for
+#: so long (s).
+_DEEP_M, _CLEAR_S = 0.25, 0.3
 #: A foot that leaves lands so far away (m) within so long (s); one that was hidden for longer (s) has not left.
 _STRIDE_M, _STEPS_S, _HIDES_S = 1.2, 0.6, 5.0
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
@@ -79,10 +73,10 @@ class Tracks:
         self._association = association
         self.bodies = association.bodies
         self._settings = settings
-        self._seats, self._masks, self._gates = Area(scene.seats), Area(scene.masks), Area(scene.gates)
-        self._region = Area([] if scene.region is None else [scene.region])
+        self._where = Whereabouts(scene)
+        self._region = self._where.region
         self._robots = [tuple(sorted(size)) for size in scene.robots]
-        self.absent = Absent(self._gates, self._region)
+        self.absent = Absent(self._where.gates, self._region)
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
@@ -186,7 +180,7 @@ class Tracks:
     def _gone(self, index: int, t: float) -> list[FloorEvent]:
         body = self.bodies[index]
         if t - body["seen"] < (
-            86400.0 if self._seated(body) else self._settings.hidden_s if self._masked(body) else 0.0
+            86400.0 if self._where.seated(body) else self._settings.hidden_s if self._where.masked(body) else 0.0
         ):
             body["clear"] = 0.0
             return self._lost(index, t)
@@ -199,7 +193,7 @@ class Tracks:
         """Who has gone on out of the room while nobody saw him has left."""
         for index in self._rows[: unseen(self.bodies, t - _THROUGH_S, self._rows)].tolist():
             body = self.bodies[index]
-            if self._through(body) and body["seen"] - body["rest_at"] < _RESTS_S:
+            if self._where.through(body) and body["seen"] - body["rest_at"] < _RESTS_S:
                 self._actions[index] = GONE
 
     def _gone_out(self, t: float) -> list[FloorEvent]:
@@ -208,7 +202,7 @@ class Tracks:
         for region in self._region.polygons:
             for index in self._rows[: outside(self.bodies, t, region, _OUTSIDE_M, self._rows)].tolist():
                 body = self.bodies[index]
-                if self._leaves(body):
+                if self._where.leaves(body):
                     self._association.forget(index)
                     self._actions[index] = NOTHING
                     events.append(Vanished(t, int(body["label"]), t, t))
@@ -229,15 +223,15 @@ class Tracks:
         body = self.bodies[index]
         if body["stale"]:
             return []
-        seated = self._sits(body)
+        seated = self._where.sits(body)
         walled = bool(self._region.polygons) and self._region.distance(float(body["x"]), float(body["y"])) > 0.0
-        if seated or (walled and not self._leaves(body)):
+        if seated or (walled and not self._where.leaves(body)):
             # Who has sat down, or would have gone through a wall, has not gone on the way he went.
             foot = "a" if body["a_seen"] > body["b_seen"] else "b"
             body["x"], body["y"] = body[f"{foot}x"], body[f"{foot}y"]
             if seated:
-                body["x"], body["y"] = self._seats.into(float(body["x"]), float(body["y"]), _DEEP_M)
-        elif body["seen"] - body["rest_at"] < _RESTS_S and self._leaves(body):
+                body["x"], body["y"] = self._where.seats.into(float(body["x"]), float(body["y"]), _DEEP_M)
+        elif body["seen"] - body["rest_at"] < _RESTS_S and self._where.leaves(body):
             self._association.forget(index)
             left = not self.absent.turns(body)
             return [Vanished(t, int(body["label"]), float(body["seen"]), t) if left else Stale(t, int(body["label"]))]
@@ -266,36 +260,6 @@ class Tracks:
         label, xy, cov = self._tell(new, t)
         vanished = Vanished(t, seemed, seen, t, into=label)
         return [vanished, Stale(t, label) if self.bodies[new]["stale"] else Moved(t, label, xy, cov)]
-
-    def _seated(self, body: Any) -> bool:
-        return body["stale"] == SEATED or self._nearest(self._seats, body) < _SEAT_M
-
-    def _sits(self, body: Any) -> bool:
-        """Whether somebody whose feet are seen no more has sat down: beside a seat, or on his way into one."""
-        into = self._seats.distance(float(body["x"]), float(body["y"])) < _INTO_M
-        return not body["robot"] and (into or self._seated(body))
-
-    def _masked(self, body: Any) -> bool:
-        return min(self._nearest(self._masks, body), self._masks.distance(body["x"], body["y"])) < _MASK_M
-
-    @staticmethod
-    def _nearest(area: Area, body: Any) -> float:
-        """How far (m) from the area a foot was seen at last."""
-        feet = [foot for foot in "ab" if body["seen"] - body[f"{foot}_seen"] < _FOOT_S]
-        return min((area.distance(body[f"{foot}x"], body[f"{foot}y"]) for foot in feet), default=math.inf)
-
-    def _leaves(self, body: Any) -> bool:
-        """Whether the body is in a door or past it."""
-        return self._through(body) or self._gates.distance(float(body["x"]), float(body["y"])) < _DOOR_M
-
-    def _through(self, body: Any) -> bool:
-        """Whether the body has gone on out of the room since it was told last: by a door, not through a wall."""
-        x, y, dx, dy = (float(body[name]) for name in ("x", "y", "told_x", "told_y"))
-        if not self._region.polygons or self._region.distance(x, y) == 0.0:
-            return False
-        ways = ((dx + u * (x - dx), dy + u * (y - dy)) for u in np.linspace(0.0, 1.0, _SAMPLES))
-        out = next((xy for xy in ways if self._region.distance(*xy) > 0.0), (x, y))
-        return not self._gates.polygons or self._gates.distance(*out) < _DOOR_M
 
     def _confirm(
         self,
@@ -375,7 +339,7 @@ class Tracks:
 
     def _missing(self, body: Any) -> int | None:
         """Which mover not seen now this one most probably is: hidden, seated, or only thought to be seen."""
-        best, best_gap = None, 1.0
+        best, best_gap, where = None, 1.0, self._where
         broad = body["wide"] > 0.3 or is_footless(body)
         for index, other in enumerate(self.bodies):
             if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
@@ -397,7 +361,7 @@ class Tracks:
             reach = _OUT_M + min(_SPEED * since, 1.2)
             if steps and since < _STEPS_S:
                 reach = max(reach, _STRIDE_M)
-            for out_of_view, area in ((self._seated, self._seats), (self._masked, self._masks)):
+            for out_of_view, area in ((where.seated, where.seats), (where.masked, where.masks)):
                 if out_of_view(other) and not steps:
                     gap, reach = min(gap, area.distance(body["x0"], body["y0"]) + 0.05), 0.7
             if gap / reach < best_gap:
