@@ -39,7 +39,7 @@ SHOD = 0.2
 #: Where so many feet were seen, and at most or at least such a share was as wide as a shoe, all show the same: legs, or
 #: shoes, also those who stand and point at the laser.
 _PLENTY, _ALL_LEGS, _ALL_SHOES = 150.0, 0.1, 0.45
-#: Of so many feet at least so few were as wide as a shoe that they are legs: of simulated shoes 0.3 are, at least.
+#: So many feet tell that legs are seen, if less than this share was as wide as a shoe: of simulated shoes 0.3 were.
 _FEW, _NO_SHOE = 50.0, 0.05
 #: The toes and the heel of a shoe are that wide, as a share of its length (`sole`); both are in view if it looks so
 #: wide (m), and it points along the way (sine of the angle).
