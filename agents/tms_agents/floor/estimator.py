@@ -151,7 +151,7 @@ class FloorEstimator:
             self._association.decide_changed()
         attend(prints, bodies, t, dt, self._association.scattered, self._shoes)
         scattered = self._association.scattered
-        mended = exchange(bodies, prints, t, scattered) + release(bodies, prints, t)
+        mended = exchange(bodies, prints, t, scattered) + release(bodies, prints, t, self._shoes, view.sight)
         if mended + take_back(bodies, prints, t, scattered):
             self._association.decide_changed()
         count_feet(prints, bodies, t, dt)

@@ -230,9 +230,12 @@ def _whole(q: Any) -> bool:
 
 @njit(cache=True)
 def _hides_none(q: Any, other_seen: float, t: float) -> bool:
-    """Whether the print, if a shoe, is seen from its tip or heel: it cannot have hidden the other one for so long."""
+    """Whether the print, if a shoe, is seen from its tip or heel: it cannot have hidden the other one for so long.
+
+    Of what is partly hidden nobody knows how wide it is.
+    """
     alone = t - max(q.rested, other_seen) > _HIDES_S
-    return bool(alone and q.width < _HIDES_M and 2 * q.covered < q.hits)
+    return bool(alone and q.width < _HIDES_M and 2 * q.whole > q.hits)
 
 
 @njit(cache=True)

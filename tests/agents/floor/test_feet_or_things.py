@@ -18,7 +18,6 @@ from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
-from tms_agents.floor.strays import release
 
 NOW = 100.0
 
@@ -128,37 +127,6 @@ def test_who_began_beside_what_came_to_rest_may_have_brought_it_in(fields: dict[
 def test_who_was_beside_it_when_it_came_to_rest_or_just_before_may_have_brought_it(busy: float, known: bool) -> None:
     """A part of it was seen while he hid the rest: it seemed to come to rest when he had gone."""
     assert brings(resting(10.0, busy=NOW + busy)[0], empty(BODY, 1)) == known
-
-
-@pytest.mark.parametrize(("apart", "released"), [(0.3, 0), (0.4, 1)])
-def test_who_stands_on_two_feet_side_by_side_keeps_both(apart: float, released: int) -> None:
-    """One shoe shows its tip; a thing that is so thin lies farther off."""
-    bodies, prints = empty(BODY, 1), empty(PRINT, 2)
-    prints["used"], prints["first"], prints["last"], prints["width"] = 1, NOW - 3.0, NOW, (0.24, 0.06)
-    prints["hits"] = prints["whole"] = prints["looks"] = 30
-    bodies["used"] = bodies["confirmed"] = 1
-    bodies["shoe"], bodies["bx"] = 0.6, apart
-    bodies["a_seen"] = bodies["b_seen"] = NOW
-    bodies["a_print"], bodies["b_print"] = 0, 1
-    assert release(bodies, prints, NOW) == released
-
-
-@pytest.mark.parametrize(
-    ("width", "later_s", "stays"), [(0.24, 3.0, 0), (0.24, -3.0, 1), (0.24, 0.5, 1), (0.35, 3.0, 1)]
-)
-def test_both_legs_side_by_side_that_stood_there_first_are_no_thing(width: float, later_s: float, stays: int) -> None:
-    """They look twice as wide as one; what was put down beside them is not whole in view."""
-    bodies, prints = empty(BODY, 1), empty(PRINT, 2)
-    prints["used"], prints["last"], prints["width"] = 1, NOW, (width, 0.06)
-    prints["first"] = NOW - 10.0, NOW - 10.0 + later_s
-    prints["hits"] = prints["looks"] = 30
-    prints["whole"] = 30, 2
-    bodies["used"] = bodies["confirmed"] = 1
-    bodies["leg"], bodies["bx"], bodies["y"] = 0.12, 0.36, 0.0
-    bodies["a_seen"] = bodies["b_seen"] = NOW
-    bodies["a_print"], bodies["b_print"] = 0, 1
-    assert release(bodies, prints, NOW) == 1
-    assert {int(bodies["a_print"][0]), int(bodies["b_print"][0])} == {stays, -1}
 
 
 @pytest.mark.parametrize(

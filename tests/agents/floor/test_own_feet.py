@@ -26,7 +26,7 @@ def stands(own_n: int = 400) -> np.ndarray:
     bodies["used"] = bodies["confirmed"] = bodies["b_print"] = 1
     bodies["label"], bodies["own"], bodies["own_n"] = 3, HIS, own_n
     bodies["seen"] = bodies["a_seen"] = bodies["b_seen"] = NOW
-    bodies["ax"], bodies["bx"], bodies["b_land"] = -0.1, 0.3, NOW - 3.0
+    bodies["ax"], bodies["bx"], bodies["b_ox"], bodies["b_land"] = -0.1, 0.3, 1e9, NOW - 3.0
     return bodies
 
 
