@@ -106,6 +106,10 @@ class Absent:
         """Whether the new one began too far from the doors, where they are known, to have come in."""
         return _DOOR_M <= self._gates.distance(float(body["x0"]), float(body["y0"])) < math.inf
 
+    def enters(self, body: Any) -> bool:
+        """Whether the new one began at a door."""
+        return bool(self._gates.distance(float(body["x0"]), float(body["y0"])) < _DOOR_M)
+
     @staticmethod
     def _likeliest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> int | None:
         """Which of those ``lost``, this long ago at most, the body most probably is, or None."""

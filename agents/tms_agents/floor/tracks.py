@@ -350,7 +350,8 @@ class Tracks:
             steps = seen > body["first"] + 0.2
             if steps:
                 lost = stuck(other, float(body["seen"]))
-                if lost is None:
+                # Who stands on one foot, in view, is not who comes in by a door.
+                if lost is None or self.absent.enters(body):
                     continue
                 x, y, seen = lost
             since = max(0.0, float(body["first"]) - seen)

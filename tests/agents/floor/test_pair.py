@@ -110,6 +110,19 @@ def test_whose_foot_was_hidden_for_long_stands_where_he_is(hidden_s: float, his:
     assert sorted(label.id for label in one.labels(NOW + 3.5)) == ([1] if his else [1, 9])
 
 
+@pytest.mark.parametrize(("door_m", "his"), [(3.0, True), (0.5, False)])
+def test_who_comes_in_by_a_door_is_not_he_who_stands_on_one_foot(door_m: float, his: bool) -> None:
+    """Far from all doors it would be he, and what he seems to stand on a thing."""
+    gate = [(4.0 - door_m, -3.0), (3.5 - door_m, -3.0), (3.5 - door_m, 3.0), (4.0 - door_m, 3.0)]
+    one = Tracks(Association(3, 4), FloorSettings(), Scene(gates=[gate]))
+    feet(one.bodies[0], 0.2, 0.6)
+    beside(one.bodies[1], 5.2, False)
+    one.bodies["b_seen"][1] = NOW - 2.5
+    (event,) = stands(one, 3.5, both=False)
+    assert type(event) is (Moved if his else Appeared)
+    assert sorted(label.id for label in one.labels(NOW + 3.5)) == ([1] if his else [1, 9])
+
+
 def test_not_before_the_room_is_known() -> None:
     one = Tracks(Association(3, 4), FloorSettings(), Scene())
     feet(one.bodies[0], 0.2, 0.6)
