@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 _SHOES_M, _LEGS_M, _ASTRIDE_S = 0.48, 0.4, 5.5
 #: So far (m) from the other a foot is seen whole; it has stood for so long (s).
 _APART_M, _STOOD_S = 0.33, 2.0
-#: Nor so far apart for so long (s) if one came so much later (s) than the other; feet are no nearer (m).
-_PUT_S, _LATER_S, _BESIDE_M = 10.0, 5.0, 0.06
+#: Nor so far apart for so long (s) if one came so much later (s) than the other. Feet are no nearer (m); who steps to a
+#: print lands when it comes to rest (s).
+_PUT_S, _LATER_S, _BESIDE_M, _LANDS_S = 10.0, 5.0, 0.06, 1.0
 #: What has been nobody's for so long (s), and half of the time, is no foot rather than what came last.
 _IDLE_S, _IDLE = 1.0, 0.5
 #: A shoe from its side is wider (m) than a thing, of which so often (share) all is seen; what is so often behind
@@ -66,7 +67,7 @@ def _stray(body: Any, prints: Any, t: float, shod: bool, sight: Any) -> int:
 @njit(cache=True)
 def _has_stepped(q: Any, x: float, y: float, landed: float, sight: Any) -> bool:
     """Whether the foot that ``landed`` on the print has gone from where it stood, (x, y) m, or has come back there."""
-    back = norm(x - q.x, y - q.y) < _BESIDE_M and landed - q.rested < _IDLE_S
+    back = norm(x - q.x, y - q.y) < _BESIDE_M and landed - q.rested < _LANDS_S
     return bool(back or clear(x, y, _BESIDE_M, *sight) == FREE)
 
 
