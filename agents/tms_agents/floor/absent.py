@@ -104,11 +104,15 @@ class Absent:
 
     def inside(self, body: Any) -> bool:
         """Whether the new one began too far from the doors, where they are known, to have come in."""
-        return _DOOR_M <= self._gates.distance(float(body["x0"]), float(body["y0"])) < math.inf
+        return _DOOR_M <= self._from_door(body) < math.inf
 
     def enters(self, body: Any) -> bool:
         """Whether the new one began at a door."""
-        return bool(self._gates.distance(float(body["x0"]), float(body["y0"])) < _DOOR_M)
+        return self._from_door(body) < _DOOR_M
+
+    def _from_door(self, body: Any) -> float:
+        """How far (m) from the next door the new one began."""
+        return self._gates.distance(float(body["x0"]), float(body["y0"]))
 
     @staticmethod
     def _likeliest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> int | None:
