@@ -73,6 +73,11 @@ class Absent:
             lost[-1]["stale"] = CONCEALED
         return bool(somebody)
 
+    @property
+    def waits(self) -> bool:
+        """Whether anybody is waited for."""
+        return bool(self._bodies)
+
     def save(self) -> dict[str, Any]:
         """JSON values."""
         return {

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.bodies import WIDE_M, narrow
+from tms_agents.floor.bodies import STAND_M, WIDE_M, narrow
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
 from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
 from tms_agents.floor.norm import norm
@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all,
 #: somebody new known already, and what has rested there as nobody's, the same too thin for a foot.
 _NOBODY, _THING, _CLUTTER, _TENTATIVE, _RESTS, _THIN = 11.0, 6.0, 4.0, 5.0, 2.0, 0.4
+#: Who has stood for so long (s), and would have stepped so lately (s) off what is still there, rather stands there.
+_STOOD_S, _STEPS_S = 3.0, 2.0
 #: A shoe that was nobody's just before (within s): less than somebody new, who is paid for once.
 _GOES_ON, _BEFORE_S = 5.0, 0.35
 #: One that is part of a foot whose middle something hides; between both parts lie so many beams at least, and so many
@@ -82,11 +84,20 @@ def nobodys(
                 body = bodies[rows[column]]
                 stands = stands or body.a_print == of[i] or body.b_print == of[i] or waits(body, c)
                 part = body.robot and norm(c.x - body.x, c.y - body.y) < 0.3 + 0.5 * body.far
-                stands = stands or part
+                stands = stands or part or _has_left(body, c, prints[of[i]], t)
             if not stands:
                 cost[i, i] = _THIN if thin(prints[of[i]]) else _RESTS
         if spans[i] < longest:
             cost[i, i] = min(cost[i, i], _PART)
+
+
+@njit(cache=True)
+def _has_left(body: Any, c: Any, q: Any, t: float) -> bool:
+    """Whether the body, that stood on both feet, would just have stepped off the print, which is still there."""
+    a, b = body.a_land, body.b_land
+    landed, before, x, y = (a, b, body.a_ox, body.a_oy) if a > b else (b, a, body.b_ox, body.b_oy)
+    stood = landed - max(q.first, before) > _STOOD_S
+    return bool(stood and t - landed < _STEPS_S and norm(c.x - x, c.y - y) < STAND_M and not body.robot)
 
 
 @njit(cache=True)

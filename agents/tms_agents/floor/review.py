@@ -33,7 +33,7 @@ _PARKED_S = 5.0
 _INERT_S = 30.0
 #: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
 #: seen in this share of the scans at least.
-_BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.36, 0.35, 0.25
+_BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.45, 0.35, 0.25
 #: Where legs are seen, two side by side are hardly ever so broad (m) in the mean while somebody stands; what is no
 #: narrower than this (m) may be furniture, and is looked at when it has rested for so long (s).
 _SIDE_BY_SIDE_M, _BLOCK_M, _SETTLED_S = 0.26, 0.18, 8.0
@@ -41,8 +41,8 @@ _SIDE_BY_SIDE_M, _BLOCK_M, _SETTLED_S = 0.26, 0.18, 8.0
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
 _REST_M = 0.15
-#: How much what is seen of a mover must look like feet (`footlike`) in the long run.
-_QUALITY = 0.3
+#: How much what is seen of a mover must look like feet (`footlike`) in the long run if it is so narrow (m) in the mean.
+_QUALITY, _THIN_M = 0.3, 0.05
 #: Who was seen so often is somebody.
 _KNOWN = 200
 #: Who is believed was seen so often, and in this share of the scans that should have shown him.
@@ -258,7 +258,7 @@ def review(
             if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
                 # One thing that does not move is no person: whoever it was is somewhere else.
                 actions[b] = LOST
-            elif body.quality < _QUALITY or misled(body) or _is_parked(body, t, legs):
+            elif (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or _is_parked(body, t, legs):
                 actions[b] = THING
             elif body.stale:
                 actions[b] = BACK

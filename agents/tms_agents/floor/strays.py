@@ -53,6 +53,11 @@ def _stray(body: Any, prints: Any, t: float, shod: bool, sight: Any) -> int:
             # Both legs stood there before the other came.
             both = not shoes and _PAIR_M[0] < odd.width < _PAIR_M[1] and other.first - odd.first > _STOOD_S
             return 1 if first != both else 2
+    if stood > _ASTRIDE_S and apart > _APART_M and shod:
+        # Nobody stands for so long with one foot pointing at the laser and the other one across.
+        first, second = _slim(p) and q.width > _SIDE_M, _slim(q) and p.width > _SIDE_M
+        if first != second:
+            return 1 if first else 2
     # A foot that is lost sight of seems to land anew where it has stood all the time.
     a_came, b_came = min(body.a_land, p.rested), min(body.b_land, q.rested)
     put = stood > _PUT_S and apart > _APART_M and abs(a_came - b_came) > _LATER_S
@@ -74,15 +79,11 @@ def _has_stepped(q: Any, x: float, y: float, landed: float, sight: Any) -> bool:
 @njit(cache=True)
 def _rather(p: Any, q: Any, later: bool, t: float, shod: bool) -> bool:
     """Whether the first print is none of his feet rather than the second, ``later``: it came later."""
-    if shod:
-        first, second = _slim(p) and q.width > _SIDE_M, _slim(q) and p.width > _SIDE_M
-        if first != second:
-            return bool(first)
     first, second = _lay_there(p, t), _lay_there(q, t)
     if first != second:
         return bool(first)
     behind, before = p.covered > _BEHIND * p.hits, q.covered > _BEHIND * q.hits
-    if shod and behind != before:
+    if shod and behind != before and (p.width if before else q.width) < _SIDE_M:
         return bool(before)
     return later
 

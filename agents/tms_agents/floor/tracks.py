@@ -35,7 +35,7 @@ from tms_agents.floor.review import (
 )
 from tms_agents.floor.settings import FloorSettings, Scene
 from tms_agents.floor.state import CONCEALED, SEATED
-from tms_agents.floor.twice import began, suspect
+from tms_agents.floor.twice import began, landed, suspect
 from tms_agents.floor.whereabouts import Whereabouts
 
 #: How much what is seen next of somebody lost must look like feet.
@@ -60,8 +60,10 @@ _OUTSIDE_M, _INSIDE_M = 0.1, 0.05
 #: Who sits does so this far (m) from the edge of the seat, and for certain, if his feet have vanished in clear view for
 #: so long (s).
 _DEEP_M, _CLEAR_S = 0.25, 0.3
-#: A foot that leaves lands so far away (m) within so long (s); one that was hidden for longer (s) has not left.
-_STRIDE_M, _STEPS_S, _HIDES_S = 1.2, 0.6, 5.0
+#: A foot that leaves lands so far away (m) within so long (s).
+_STRIDE_M, _STEPS_S = 1.2, 0.6
+#: Who puts something down goes on within this (s).
+_STANDS_S = 5.0
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
 _SHIFT_M, _BY_ITSELF_S, _HITS = 0.35, 2.0, 5
 
@@ -337,6 +339,13 @@ class Tracks:
             return bool(0.7 * least < body["far"] < 1.2 * most and body["wide"] > 0.3)
         return bool(body["wide"] > 0.5)
 
+    def _stands(self, body: Any, new: Any) -> bool:
+        """Whether who shows one foot has stood there for long, and the ``new`` one stands, too, or may be another."""
+        t = float(new["seen"])
+        people = (self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1) & (self.bodies["robot"] == 0)
+        others = self.absent.waits or (people & (self.bodies["label"] != body["label"])).any()
+        return t - landed(body) > _STANDS_S and bool(others or is_pair(new, t))
+
     def _missing(self, body: Any) -> int | None:
         """Which mover not seen now this one most probably is: hidden, seated, or only thought to be seen."""
         best, best_gap, where = None, 1.0, self._where
@@ -350,14 +359,11 @@ class Tracks:
             steps = seen > body["first"] + 0.2
             if steps:
                 lost = stuck(other, float(body["seen"]))
-                # Who stands on one foot, in view, is not who comes in by a door.
-                if lost is None or self.absent.enters(body):
+                # Who stands on one foot, in view, is not who comes in by a door, nor who may be somebody else.
+                if lost is None or self._stands(other, body) or self.absent.enters(body):
                     continue
                 x, y, seen = lost
             since = max(0.0, float(body["first"]) - seen)
-            if steps and since > _HIDES_S and is_pair(body, float(body["seen"])):
-                # Who stands and hides one foot for so long stands on; these are somebody else's.
-                continue
             gap = math.hypot(body["x0"] - x, body["y0"] - y)
             reach = _OUT_M + min(_SPEED * since, 1.2)
             if steps and since < _STEPS_S:

@@ -17,6 +17,8 @@ _AWAY_M, _SPEED, _GONE_S = 1.2, 1.2, 3.0
 _THERE_S = 0.5
 #: What he has put down he put down before he was seen elsewhere, or seemed to tread on so shortly (s) after that.
 _PUT_S = 0.5
+#: Who puts something down goes on within this (s).
+_STANDS_S = 20.0
 
 
 @njit(cache=True)
@@ -26,6 +28,9 @@ def suspect(bodies: Any, index: int, t: float) -> None:
     for b in range(bodies.size):
         body = bodies[b]
         if b == index or not body.used or not body.confirmed or body.robot or body.stale or t - body.seen > _THERE_S:
+            continue
+        if t - landed(body) > _STANDS_S:
+            # He stands.
             continue
         away = min(norm(new.x0 - body.ax, new.y0 - body.ay), norm(new.x0 - body.bx, new.y0 - body.by))
         away = min(away, norm(new.x0 - body.x, new.y0 - body.y))
@@ -37,8 +42,13 @@ def suspect(bodies: Any, index: int, t: float) -> None:
 @njit(cache=True)
 def suspected(body: Any) -> bool:
     """Whether the body has stood on what is seen of it now since before somebody began who may be who it was."""
-    land = body.a_land if body.a_seen >= body.b_seen else body.b_land
-    return bool(land < body.suspected + _PUT_S)
+    return bool(landed(body) < body.suspected + _PUT_S)
+
+
+@njit(cache=True)
+def landed(body: Any) -> float:
+    """When (s) the foot came where it is that was seen last."""
+    return float(body.a_land if body.a_seen >= body.b_seen else body.b_land)
 
 
 def began(bodies: Any, body: Any, thing: bool) -> int:

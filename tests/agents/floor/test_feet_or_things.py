@@ -242,6 +242,30 @@ def test_what_was_his_foot_a_moment_ago_may_be_again() -> None:
     assert cost[1, 0, 0] < cost[0, 0, 0] - 2.0
 
 
+@pytest.mark.parametrize(
+    ("fields", "price"),
+    [
+        ({}, 5.0),
+        ({"a_land": NOW - 2.5}, 2.0),  # it is long ago
+        ({"b_land": NOW - 2.0}, 2.0),  # he was walking
+        ({"a_ox": 1.1}, 2.0),  # stood elsewhere
+        ({"robot": 1}, 2.0),
+    ],
+)
+def test_who_stood_has_not_stepped_off_what_is_still_there(fields: dict[str, float], price: float) -> None:
+    """That would cost more than that somebody else has stepped there."""
+    prints, clusters, cost = resting(30.0), np.zeros(1, CLUSTER), np.zeros((1, 1))
+    bodies, one = empty(BODY, 1), np.zeros(1, np.int64)
+    bodies["used"] = bodies["confirmed"] = 1
+    bodies["a_print"] = bodies["b_print"] = -1
+    bodies["a_land"], bodies["b_land"], bodies["a_ox"], bodies["b_ox"] = NOW - 0.1, NOW - 30.0, 1.0, 1e9
+    for name, value in fields.items():
+        bodies[name] = value
+    clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 1.0, 12, 0.12, 0.01
+    nobodys(clusters, one, prints, bodies, one, np.array([np.inf]), NOW, cost)
+    assert cost[0, 0] == pytest.approx(price)
+
+
 def test_what_is_left_in_a_door_is_told_when_who_left_it_is_elsewhere() -> None:
     """He puts it at his feet, so that it might be one of them, and goes on into the room."""
     door = [(3.9, 1.0), (5.0, 1.0), (5.0, 3.0), (3.9, 3.0)]

@@ -98,13 +98,13 @@ def test_not_if_one_of_them_may_be_the_other_foot_of_somebody_there(x: float, bo
     assert len(new) == somebody
 
 
-@pytest.mark.parametrize(("hidden_s", "his"), [(2.5, True), (15.0, False)])
-def test_whose_foot_was_hidden_for_long_stands_where_he_is(hidden_s: float, his: bool) -> None:
-    """Whose foot was not has stepped away, and what he seemed to stand on is a thing."""
+@pytest.mark.parametrize(("ago", "his"), [(1.0, True), (9.0, False)])
+def test_who_has_stood_on_one_foot_for_long_stands_where_he_is(ago: float, his: bool) -> None:
+    """Who has not has stepped away, and what he seemed to stand on is a thing."""
     one = Tracks(Association(3, 4), FloorSettings(), Scene())
     feet(one.bodies[0], 0.2, 0.6)
     beside(one.bodies[1], 5.2, False)
-    one.bodies["b_seen"][1] = NOW - hidden_s
+    one.bodies["b_seen"][1], one.bodies["a_land"][1] = NOW - 2.5, NOW - ago
     (event,) = stands(one, 3.5, both=False)
     assert type(event) is (Moved if his else Appeared)
     assert sorted(label.id for label in one.labels(NOW + 3.5)) == ([1] if his else [1, 9])
@@ -117,7 +117,7 @@ def test_who_comes_in_by_a_door_is_not_he_who_stands_on_one_foot(door_m: float, 
     one = Tracks(Association(3, 4), FloorSettings(), Scene(gates=[gate]))
     feet(one.bodies[0], 0.2, 0.6)
     beside(one.bodies[1], 5.2, False)
-    one.bodies["b_seen"][1] = NOW - 2.5
+    one.bodies["b_seen"][1], one.bodies["a_land"][1] = NOW - 2.5, NOW - 1.0
     (event,) = stands(one, 3.5, both=False)
     assert type(event) is (Moved if his else Appeared)
     assert sorted(label.id for label in one.labels(NOW + 3.5)) == ([1] if his else [1, 9])

@@ -138,6 +138,22 @@ def test_who_seems_to_rest_and_is_broad_is_furniture(width: float, legs: bool, i
     assert after_s > 7.0
 
 
+@pytest.mark.parametrize(
+    ("fields", "gone"),
+    [
+        ({"quality": 0.25, "width": 0.03}, True),
+        ({"quality": 0.25, "width": 0.1}, False),  # his feet are half hidden behind others
+        ({"quality": 0.5, "width": 0.03}, False),
+        ({"shoe": 1.0, "width": 0.5, "pushed": 0.5}, True),
+        ({"shoe": 1.0, "width": 0.42, "pushed": 0.5}, False),  # two shoes side by side
+    ],
+)
+def test_what_is_too_narrow_or_too_broad_for_feet_in_the_mean_is_none(fields: dict[str, float], gone: bool) -> None:
+    one = room()
+    somebody(one.bodies[0], 4.0, 0.0, **fields)
+    assert bool(rests(one, 6.0, legs=False, is_furniture=False)[0]) == gone
+
+
 def test_nobody_who_shows_two_feet_is_a_piece() -> None:
     one = room()
     somebody(one.bodies[0], 4.0, 0.0, width=0.25)

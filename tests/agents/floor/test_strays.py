@@ -162,3 +162,30 @@ def test_the_foot_of_another_is_not_put_there(idle: float, given: int) -> None:
     bodies["a_print"], bodies["b_print"] = 0, 1
     assert release(bodies, prints, NOW, LEGS, HIDDEN) == 1
     assert prints["given"].tolist() == [0, given]
+
+
+@pytest.mark.parametrize(
+    ("ago", "widths", "whole", "kept"),
+    [
+        ((50.0, 6.0), (0.25, 0.08), 100, (0, -1)),
+        ((50.0, 6.0), (0.08, 0.25), 100, (-1, 1)),
+        ((7.0, 7.0), (0.25, 0.08), 100, (0, -1)),  # they came together
+        ((50.0, 4.0), (0.25, 0.08), 100, (0, 1)),  # he may turn that foot yet
+        ((50.0, 6.0), (0.25, 0.16), 100, (0, 1)),  # he may stand so
+        ((50.0, 6.0), (0.25, 0.08), 10, (0, 1)),  # hardly ever all of it is seen
+    ],
+)
+def test_nobody_stands_with_one_shoe_along_and_the_other_across(
+    ago: tuple[float, float], widths: tuple[float, float], whole: int, kept: tuple[int, int]
+) -> None:
+    """Even if it looks as if he had put his foot there."""
+    bodies, prints = standing(0.36, *ago, width=widths, whole=(100, whole) if widths[0] > widths[1] else (whole, 100))
+    bodies["a_ox"] = bodies["b_ox"] = 0.1
+    assert release(bodies, prints, NOW, SHOES, FREE) == (-1 in kept)
+    assert stands_on(bodies) == kept
+
+
+def test_a_shoe_seen_from_its_side_was_not_put_before_the_other_one() -> None:
+    bodies, prints = standing(0.6, 50.0, 12.0, width=(0.25, 0.03), whole=(100, 0), covered=(0, 100))
+    assert release(bodies, prints, NOW, SHOES, HIDDEN) == 1
+    assert stands_on(bodies) == (0, -1)

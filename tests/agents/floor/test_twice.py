@@ -73,6 +73,28 @@ def test_who_begins_beside_one_who_stands_may_be_he(
     assert (begins(gates, x0, -0.5, **fields).bodies["suspected"][0] == NOW - 1.0) == suspected
 
 
+@pytest.mark.parametrize(
+    ("landed_s", "others", "his"),
+    [(3.0, 1, True), (30.0, 1, False), (30.0, 0, True)],
+    ids=["has just come there", "has stood there for long", "nobody else is there"],
+)
+def test_who_goes_on_from_where_one_stands_is_he_only_if_that_one_came_just_now(
+    landed_s: float, others: int, his: bool
+) -> None:
+    """Who puts something down is off within seconds; and nobody but him walks where he is alone."""
+    one = room([DOOR])
+    stander(one.bodies[0], NOW - 2.3, a_land=NOW - landed_s)
+    stander(one.bodies[2], NOW - 50.0, label=2, x=8.0, ax=8.0, bx=8.0, b_seen=NOW, told_x=8.0, used=others)
+    comer(one.bodies[1], 4.3, 0.3, NOW - 2.0)
+    assert [type(event) for event in at(one, NOW)] == [Moved if his else Appeared]
+
+
+@pytest.mark.parametrize(("landed_s", "suspected"), [(15.0, True), (25.0, False)])
+def test_nor_may_he_be_who_has_stood_there_for_long(landed_s: float, suspected: bool) -> None:
+    one = begins([DOOR], 5.0, -0.5, a_land=NOW - landed_s)
+    assert (one.bodies["suspected"][0] == NOW - 1.0) == suspected
+
+
 def test_who_comes_in_by_a_door_is_not() -> None:
     one = room([DOOR])
     stander(one.bodies[0], NOW - 1.5, x=6.6, ax=6.6, bx=6.6, rest_x=6.6, told_x=6.6)
