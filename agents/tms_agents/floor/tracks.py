@@ -62,7 +62,7 @@ _OUTSIDE_M, _INSIDE_M = 0.1, 0.05
 _DEEP_M, _CLEAR_S = 0.25, 0.3
 #: A foot that leaves lands so far away (m) within so long (s).
 _STRIDE_M, _STEPS_S = 1.2, 0.6
-#: Who puts something down goes on within this (s).
+#: Who puts something down and is taken to stand on it has gone on within this (s).
 _STANDS_S = 5.0
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
 _SHIFT_M, _BY_ITSELF_S, _HITS = 0.35, 2.0, 5

@@ -17,7 +17,7 @@ _AWAY_M, _SPEED, _GONE_S = 1.2, 1.2, 3.0
 _THERE_S = 0.5
 #: What he has put down he put down before he was seen elsewhere, or seemed to tread on so shortly (s) after that.
 _PUT_S = 0.5
-#: Who puts something down goes on within this (s).
+#: What somebody has stood on for so long (s) is his foot.
 _STANDS_S = 20.0
 
 
@@ -30,7 +30,6 @@ def suspect(bodies: Any, index: int, t: float) -> None:
         if b == index or not body.used or not body.confirmed or body.robot or body.stale or t - body.seen > _THERE_S:
             continue
         if t - landed(body) > _STANDS_S:
-            # He stands.
             continue
         away = min(norm(new.x0 - body.ax, new.y0 - body.ay), norm(new.x0 - body.bx, new.y0 - body.by))
         away = min(away, norm(new.x0 - body.x, new.y0 - body.y))
