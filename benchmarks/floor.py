@@ -5,6 +5,7 @@
     python benchmarks/floor.py --only movers       or objects, plain, static, samples, speed, memory
     python benchmarks/floor.py --seeds unseen      or tuning; both by default
     python benchmarks/floor.py --first 1070        other unseen seeds: five from there on, or --count of them
+    python benchmarks/floor.py --untold            nothing of the room is told: neither doors, seats nor sizes of robots
     python benchmarks/floor.py --look "three" --seed 3 --feet prints     one world in numbers
 
 Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz; `plain`: of 683 beams that reach 5.6 m
@@ -58,6 +59,7 @@ class Job:
     contestant: str
     duration: float | None = None
     plain: bool = False
+    told: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--contestants", default="ours,laboratory", help="comma separated")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--hours", type=float, help="simulated hours of --only memory and static, 24 and 1 by default")
+    parser.add_argument("--untold", action="store_true", help="nothing of the room is told")
     parser.add_argument("--look", metavar="SCENE", help="one world")
     parser.add_argument("--feet", choices=FEET, default="prints", help="with --look")
     parser.add_argument("--seed", type=int, default=1, help="with --look")
@@ -91,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if args.look:
         try:
             for name in names:
-                look(Job(args.look, args.feet, args.seed, name))
+                look(Job(args.look, args.feet, args.seed, name, told=not args.untold))
             return
         except ValueError as error:
             parser.error(str(error))
@@ -100,12 +103,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with ProcessPoolExecutor(args.jobs) as pool:
         if args.only in (None, "movers", "objects"):
             scenes = {"movers": MOVER_SCENES, "objects": OBJECT_SCENES}.get(args.only or "", SCENES)
-            worlds(pool, scenes, seeds, names)
+            worlds(pool, scenes, seeds, names, told=not args.untold)
         if args.only in (None, "plain"):
             print("# A coarse laser without brightness\n")
-            worlds(pool, PLAIN_SCENES, seeds, names, plain=True)
+            worlds(pool, PLAIN_SCENES, seeds, names, plain=True, told=not args.untold)
         if args.only in (None, "static"):
-            static(pool, seeds, names, 3600 * (args.hours or (0.2 if args.quick else 1.0)))
+            hours = args.hours or (0.2 if args.quick else 1.0)
+            static(pool, seeds, names, 3600 * hours, told=not args.untold)
     if args.only in (None, "samples"):
         samples(names)
     if args.only in (None, "speed"):
@@ -124,10 +128,14 @@ def worlds(
     names: Sequence[str],
     *,
     plain: bool = False,
+    told: bool = True,
 ) -> None:
-    """Every scene with every kind of feet; ``plain``: seen by a coarse laser that tells no brightness."""
+    """Every scene with every kind of feet; ``plain``: seen by a coarse laser that tells no brightness.
+
+    ``told``: the contestants know the plan of the room.
+    """
     jobs = [
-        Job(scene, feet, seed, name, plain=plain)
+        Job(scene, feet, seed, name, plain=plain, told=told)
         for scene in scenes
         for feet in FEET
         for kind in seeds.values()
@@ -137,7 +145,7 @@ def worlds(
     done = dict(zip(jobs, pool.map(judged, jobs), strict=True))
 
     def of(scene: str, feet: str, kind: str, name: str) -> list[Scores]:
-        return [done[Job(scene, _feet(feet), seed, name, plain=plain)].scores for seed in seeds[kind]]
+        return [done[Job(scene, _feet(feet), seed, name, plain=plain, told=told)].scores for seed in seeds[kind]]
 
     for kind, numbers in seeds.items():
         print(f"## Seeds {numbers[0]} to {numbers[-1]} ({kind}); mean and standard deviation over the seeds\n")
@@ -157,7 +165,7 @@ def judged(job: Job) -> Outcome:
     laser = LASERS["coarse" if job.plain else "fine"]
     world = FloorWorld(job.scene, job.seed, feet=job.feet, laser=laser, duration=job.duration)
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
-    contestant = CONTESTANTS[job.contestant](sensors, world.known())
+    contestant = CONTESTANTS[job.contestant](sensors, world.known() if job.told else None)
     scans = ((f.sensor, f.t, f.ranges, None if job.plain else f.intensities) for f in world.scans())
     prediction, late_events = told(contestant, scans)
     late = {one["id"] for frame in prediction if frame["t"] > 30 for one in frame["labels"]}
@@ -187,9 +195,12 @@ def look(job: Job) -> None:
 # nothing happens
 
 
-def static(pool: ProcessPoolExecutor, seeds: dict[str, range], names: Sequence[str], seconds: float) -> None:
+def static(
+    pool: ProcessPoolExecutor, seeds: dict[str, range], names: Sequence[str], seconds: float, *, told: bool
+) -> None:
     """Nobody is there: how many events and labels after the first half minute?"""
-    jobs = [Job("static", "prints", seed, name, seconds) for kind in seeds.values() for seed in kind for name in names]
+    numbers = [seed for kind in seeds.values() for seed in kind]
+    jobs = [Job("static", "prints", seed, name, seconds, told=told) for seed in numbers for name in names]
     done = dict(zip(jobs, pool.map(judged, jobs), strict=True))
     rows = {(job.contestant, job.seed): (one.late_events, one.late_labels) for job, one in done.items()}
     print(static_table(rows, seconds), end="\n\n", flush=True)

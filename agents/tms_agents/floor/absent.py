@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tms_agents.floor.doors import Doors
 from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.identity import alike
 from tms_agents.floor.masks import Area
@@ -17,8 +18,6 @@ from tms_agents.floor.state import BODY, CONCEALED, SEATED, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
-#: So near a door (m) people come; who is lost so near one has gone.
-_DOOR_M, _GONE_M = 1.0, 0.3
 #: Who was seen for so many scans is somebody.
 _SOMEBODY = 30
 #: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s). He may stand on
@@ -27,8 +26,8 @@ _AWAY_M, _SPEED, _WAIT_S, _LATELY_S = 1.0, 1.0, 60.0, 20.0
 #: Who was seen last so far (m) on this side of the threshold may have turned round; then he is seen again within this
 #: (s), and believed so long (s) after that at most.
 _THRESHOLD_M, _TURNS_S, _BELIEVED_S = 0.25, 6.0, 1.5
-#: Who seemed to sit down so lately (s) may have gone on.
-_PASSES_S = 6.0
+#: Who seemed to sit down so lately (s) may have gone on, who seemed to go out where no door is told so lately (s).
+_PASSES_S, _ROUND_S = 6.0, 3.0
 #: So near (m) where he was lost he may stand, since so long (s) before that at most.
 _STEPS_M, _JUST_S = 1.2, 4.0
 #: Of who stands among others a part is hidden now and then: what is always seen whole is no foot of his, unless it is
@@ -39,24 +38,27 @@ _UNLIKE = -6.0
 
 
 class Absent:
-    """``gates``: the doors of ``region``. Where none is known people may come and go anywhere: nobody is waited for."""
+    """``gates``: the doors of ``region``; where none is told, `Doors` learns where people come and go."""
 
     def __init__(self, gates: Area, region: Area) -> None:
-        self._gates, self._region = gates, region
+        self.doors, self._region = Doors(gates), region
         self._bodies: list[Any] = []
         self._turning: list[Any] = []
+        #: Whether somebody was waited for in vain.
+        self._missed = False
 
     def keep(self, body: Any) -> bool:
-        """Whether this one, of whom nothing is seen any more, must be somewhere: then he is waited for."""
-        inside = math.inf > self._gates.distance(float(body["x"]), float(body["y"])) > _GONE_M
-        return inside and self._wait(self._bodies, body)
+        """Whether this one, of whom nothing is seen any more, must be somewhere, or may be: then he is waited for."""
+        if self.doors.keeps(body):
+            return self._wait(self._bodies, body)
+        return not self.doors.told and self.doors.known and self._wait(self._turning, body)
 
     def turns(self, body: Any) -> bool:
         """Whether this one, who seems to have gone out by a door, may have turned round in it: then he is waited for.
 
         Whoever goes out is seen last on the threshold.
         """
-        if not self._gates.polygons:
+        if not self.doors.told:
             return False
         foot = "a" if body["a_seen"] > body["b_seen"] else "b"
         x, y = float(body[f"{foot}x"]), float(body[f"{foot}y"])
@@ -83,6 +85,8 @@ class Absent:
         return {
             "waiting": pack(np.array(self._bodies, BODY)),
             "turning": pack(np.array(self._turning, BODY)),
+            "doors": self.doors.save(),
+            "missed": self._missed,
         }
 
     def restore(self, saved: Any) -> None:
@@ -90,10 +94,14 @@ class Absent:
         waiting, turning = (saved[name] for name in ("waiting", "turning"))
         self._bodies = list(unpack(waiting, empty(BODY, int(waiting["shape"][0]))))
         self._turning = list(unpack(turning, empty(BODY, int(turning["shape"][0]))))
+        self.doors.restore(saved["doors"])
+        self._missed = bool(saved["missed"])
 
     def find(self, body: Any, scattered: Array) -> Any:
         """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `alike` takes."""
-        for lost, within_s in ((self._turning, _TURNS_S), (self._bodies if self.inside(body) else [], _WAIT_S)):
+        inside = self.inside(body)
+        turning = self._turning if inside or self.doors.told else []
+        for lost, within_s in ((turning, self._turns_s), (self._bodies if inside else [], _WAIT_S)):
             index = self._likeliest(lost, body, scattered, within_s)
             if index is not None:
                 return lost.pop(index)
@@ -109,15 +117,16 @@ class Absent:
 
     def inside(self, body: Any) -> bool:
         """Whether the new one began too far from the doors, where they are known, to have come in."""
-        return _DOOR_M <= self._from_door(body) < math.inf
+        return self.doors.inside(float(body["x0"]), float(body["y0"]))
 
     def enters(self, body: Any) -> bool:
         """Whether the new one began at a door."""
-        return self._from_door(body) < _DOOR_M
+        return self.doors.enters(float(body["x0"]), float(body["y0"]))
 
-    def _from_door(self, body: Any) -> float:
-        """How far (m) from the next door the new one began."""
-        return self._gates.distance(float(body["x0"]), float(body["y0"]))
+    def came(self, body: Any, alone: bool) -> None:
+        """The new one is nobody of those waited for; ``alone``: nobody is hidden or seated who might be he."""
+        nobody = alone and not self._bodies and not self._turning and not self._missed
+        self.doors.came(float(body["x0"]), float(body["y0"]), nobody)
 
     @staticmethod
     def _likeliest(lost: list[Any], body: Any, scattered: Array, within_s: float) -> int | None:
@@ -159,13 +168,19 @@ class Absent:
         came = [one for one in self._bodies if print_["rested"] > one["seen"] - _JUST_S]
         return [one for one in came if _away(print_, one) < _STEPS_M]
 
+    @property
+    def _turns_s(self) -> float:
+        """How long (s) who seems to have gone out may turn round."""
+        return _TURNS_S if self.doors.told else _ROUND_S
+
     def gone(self, t: float) -> list[FloorEvent]:
         """Those who did not turn up."""
         events: list[FloorEvent] = []
-        for lost, wait_s in ((self._bodies, _WAIT_S), (self._turning, _TURNS_S + _BELIEVED_S)):
+        for lost, wait_s in ((self._bodies, _WAIT_S), (self._turning, self._turns_s + _BELIEVED_S)):
             if not lost:
                 continue
             late = [one for one in lost if t - one["seen"] > wait_s]
+            self._missed |= bool(late) and lost is self._bodies
             events += [Vanished(t, int(one["label"]), float(one["seen"]), t) for one in late]
             lost[:] = [one for one in lost if t - one["seen"] <= wait_s]
         return events

@@ -27,6 +27,7 @@ from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure, note
+from tms_agents.floor.sight import edges_of_sight, looks_past
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.strays import release
 from tms_agents.floor.tracks import Tracks
@@ -45,8 +46,10 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 14: when somebody began to be seen who may be who a body was.
-_FORMAT = 14
+#: So often (s) it is looked how far the lasers see, where no gates are told.
+_LOOKS_S = 2.0
+#: Of saved states; 15: where people came in, where no gates are told.
+_FORMAT = 15
 
 
 class FloorEstimator:
@@ -104,6 +107,8 @@ class FloorEstimator:
         if background.ready:
             events = self._understand(view, states, t, dt, _lights(intensities, view.n))
         background.learn(view.ranges, view.claimed, dt)
+        if not self._tracks.absent.doors.told and t // _LOOKS_S > (t - dt) // _LOOKS_S:
+            self._look_round()
         return events
 
     def labels(self) -> list[FloorLabel]:
@@ -177,6 +182,19 @@ class FloorEstimator:
         self._association.settle()
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared
+
+    def _look_round(self) -> None:
+        """How far all lasers see, once they know the room."""
+        views = list(self._views.values())
+        if not all(view.background.learned for view in views):
+            return
+        edges = []
+        for view in views:
+            mine = edges_of_sight(*view.reach)
+            for other in views:
+                mine = mine if other is view else mine[~looks_past(mine, *other.reach)]
+            edges.append(mine)
+        self._tracks.absent.doors.see(np.concatenate(edges))
 
     def _pieces(self, t: float) -> list[Piece]:
         return [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]

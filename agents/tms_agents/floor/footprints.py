@@ -7,7 +7,6 @@ for, and where it goes it is not found by whose feet fit, but by its outline.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -18,6 +17,7 @@ from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.masks import Area
 from tms_agents.floor.outline import search
 from tms_agents.floor.pursuit import SAME_M, goes, is_near, own, pursue, wide
+from tms_agents.floor.robot_sizes import RobotSizes
 from tms_agents.floor.state import FOOTPRINT, empty, free_slot, pack, unpack
 from tms_agents.floor.view import View
 
@@ -31,14 +31,14 @@ _BROAD = 0.3
 
 
 class Footprints:
-    """``robots``: (width, length) m of those there are; where none is known nobody is followed by an outline.
+    """``robots``: (width, length) m of those there are; where none is told sizes are learned (`robot_sizes`).
 
     ``gates``: where they come in. The bodies of ``association`` go where their footprints are.
     """
 
     def __init__(self, robots: Sequence[tuple[float, float]], gates: Area, association: Association) -> None:
         self._sizes = sorted({(0.5 * max(size), 0.5 * min(size)) for size in robots})
-        self._least_m = 2.0 * _PART * min((half for _, half in self._sizes), default=math.inf)
+        self._learned = None if self._sizes else RobotSizes()
         self._gates, self._association = gates, association
         self._all, self._spare = empty(FOOTPRINT, _MOST), empty(FOOTPRINT, 1)
         self._order, self._seen = np.zeros(_MOST, np.int64), np.zeros(_MOST, np.bool_)
@@ -50,17 +50,20 @@ class Footprints:
         ``pieces`` tells which pieces of the background have gone.
         """
         m = int(clusters.size)
-        if not self._sizes:
-            return m
         scan: Any = (view.ranges, view.background.states, view.rays, view.pose, view.first, view.step)
         bodies, scratch = self._association.bodies, (self._at, self._how)
+        if self._learned is not None:
+            self._learned.look(bodies, clusters, scan, t)
+            self._sizes = self._learned.known
+        if not self._sizes:
+            return m
         count = pursue(self._all, self._spare, bodies, t, self._order, self._seen, *scratch, *scan)
         if count:
             self._recognize(pieces, t)
             room: Any = (self._association.hypotheses, t, view.claimed, self._at, view.ranges, view.rays, view.pose)
             m = int(own(self._all, self._order[:count], self._seen, clusters, *room))
-        k = -1
-        while (k := wide(clusters[:m], k + 1, self._all, self._least_m, t)) < m:
+        k, least_m = -1, 2.0 * _PART * min(half for _, half in self._sizes)
+        while (k := wide(clusters[:m], k + 1, self._all, least_m, t)) < m:
             self._begin(clusters[k], scan, t)
         return m
 
@@ -108,8 +111,10 @@ class Footprints:
 
     def save(self) -> dict[str, Any]:
         """JSON values."""
-        return pack(self._all)
+        return {"all": pack(self._all), "learned": None if self._learned is None else self._learned.save()}
 
     def restore(self, saved: Any) -> None:
-        """Raises ValueError where that is nothing that ``save`` gave."""
-        self._all[:] = unpack(saved, self._all)
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        self._all[:] = unpack(saved["all"], self._all)
+        if self._learned is not None:
+            self._learned.restore(saved["learned"])

@@ -25,9 +25,9 @@ class Sensor:
 class Scene:
     """What is known of the room, in its frame, metres. Everything may be left out.
 
-    ``region``: where labels are wanted. ``gates``: where people come in and go out (none: anywhere in sight).
+    ``region``: where labels are wanted. ``gates``: where people come in and go out (none: learned from who comes).
     ``masks``: where nothing is looked for. ``seats``: where people leave the scan plane without leaving the room (bed,
-    chair). ``mirrors``: flat mirrors on the floor, each a segment. ``robots``: width and length of known robots.
+    chair). ``mirrors``: flat mirrors on the floor, each a segment. ``robots``: their width and length (none: learned).
     """
 
     region: Polygon | None = None

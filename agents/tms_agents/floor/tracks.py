@@ -304,6 +304,8 @@ class Tracks:
             return [Back(t, label, xy)] if old["stale"] else [Moved(t, label, xy, cov)]
         body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
         self._association.named(index)
+        hidden = (self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1) & (self.bodies["stale"] != 0)
+        self.absent.came(body, not hidden.any())
         if self.absent.inside(body) and not robot and not is_footless(body):
             suspect(self.bodies, index, t)
         label, xy, cov = self._tell(index, t)

@@ -70,3 +70,10 @@ class View:
         """What `freespace.clear` needs."""
         b = self.background
         return self.ranges, b.states, b.longest, self.pose, self.first, self.step
+
+    @property
+    def reach(self) -> tuple[Array, float, Array, Array]:
+        """What `sight.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
+        sweep = self.sensor.sweep
+        farthest = np.minimum(self.background.longest, self.rays[:, 8])
+        return farthest, sweep.range_max_m - 1e-3, np.asarray(sweep.angles, dtype=float), self.pose

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from tms_agents.floor.absent import Absent
@@ -83,6 +84,55 @@ def test_without_doors_people_may_leave_anywhere() -> None:
     open_plan = Absent(Area([]), Area([ROOM]))
     assert not open_plan.keep(person(4.0, 4.0))
     assert not open_plan.turns(person(4.0, 4.0))
+
+
+@pytest.fixture
+def untold() -> Absent:
+    """Nothing is told: sight ends at x = 0, where somebody has come, and at x = 8."""
+    found = Absent(Area([]), Area([]))
+    found.doors.see(np.array([[0.0, -3.0, 0.0, 6.0], [8.0, -3.0, 8.0, 6.0]]))
+    found.came(person(0.2, 4.0), alone=True)
+    return found
+
+
+def lost_at(x: float, *, label: int = 3):
+    body = person(x, 4.0, label=label)
+    body["ax"], body["ay"], body["a_seen"] = x, 4.0, 10.0
+    return body
+
+
+@pytest.mark.parametrize("x", [4.0, 7.8], ids=["in plain sight", "behind something"])
+def test_without_doors_who_is_lost_far_from_where_people_come_is_waited_for(untold: Absent, x: float) -> None:
+    assert untold.keep(lost_at(x))
+    assert untold.find(person(0.3, 4.0, first=40.0), expected()) is None
+    assert untold.find(person(x - 0.5, 4.0, first=40.0), expected())["label"] == 3
+
+
+@pytest.mark.parametrize(("first", "same"), [(12.0, True), (14.0, False)])
+def test_without_doors_who_is_lost_where_people_come_may_turn_round_at_once(
+    untold: Absent, first: float, same: bool
+) -> None:
+    assert untold.keep(lost_at(0.3))
+    assert untold.find(person(0.3, 4.0, first=first), expected()) is None
+    assert (untold.find(person(2.0, 4.0, first=first), expected()) is not None) == same
+
+
+def test_without_doors_who_goes_where_people_come_has_left_seconds_later(untold: Absent) -> None:
+    untold.keep(lost_at(0.3, label=4))
+    untold.keep(lost_at(4.0, label=5))
+    assert untold.gone(15.0) == [Vanished(15.0, 4, 10.0, 15.0)]
+    assert untold.gone(71.0) == [Vanished(71.0, 5, 10.0, 71.0)]
+
+
+def test_who_was_waited_for_in_vain_may_be_who_comes_in_the_middle_of_the_room(untold: Absent) -> None:
+    untold.keep(lost_at(4.0))
+    untold.gone(71.0)
+    untold.came(person(5.0, 4.0), alone=True)
+    assert untold.keep(lost_at(5.0))
+    again = Absent(Area([]), Area([]))
+    again.restore(json.loads(json.dumps(untold.save())))
+    again.came(person(2.0, 4.0), alone=True)
+    assert again.inside(person(2.0, 4.0))
 
 
 def test_a_glimpse_is_nobody(absent: Absent) -> None:
