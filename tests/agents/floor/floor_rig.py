@@ -85,6 +85,13 @@ COMES, STOPS, PUTS, GOES, GONE = 3.0, 5.5, 6.0, 7.0, 9.0
 #: Settings for a story of seconds: learn the empty room, believe in things, quickly.
 QUICK = "[estimator]\nlearn_s = 1.5\nstart_s = 0.5\n"
 PUT_AT = (2.3, 1.7)
+#: Where that is: people come through the wall on the left and go through the wall on the right.
+DOORS = """[scene]
+gates = [
+  [[-0.5, 1.5], [0.5, 1.5], [0.5, 2.5], [-0.5, 2.5]],
+  [[4.5, 1.5], [5.5, 1.5], [5.5, 2.5], [4.5, 2.5]],
+]
+"""
 
 
 def story(room: Room, t: float) -> None:

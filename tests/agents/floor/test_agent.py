@@ -7,7 +7,7 @@ import contextlib
 import math
 
 import numpy as np
-from floor_rig import COMES, PUT_AT, QUICK, Playing, Room, agent, laser_toml
+from floor_rig import COMES, DOORS, PUT_AT, QUICK, Playing, Room, agent, laser_toml
 
 from tms_agents.devices.emulation import TcpLine
 from tms_agents.devices.scip import ScipDevice
@@ -47,7 +47,7 @@ async def test_a_walker_who_leaves_a_thing(rig):
     room = Room()
     laser = Laser(room)
     async with laser.line() as line:
-        floor = rig(scip(line), more='[recording]\npath = "floor.scans"\n' + QUICK)
+        floor = rig(scip(line), more='[recording]\npath = "floor.scans"\n' + QUICK + DOORS)
         async with agent(floor.config):
             await floor.state("connected", "SCIP laser", timeout_s=180.0)
             await asyncio.sleep(2.0)  # the room is learnt

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from floor_rig import COMES, GONE, PUT_AT, QUICK, Room, config_toml, laser_toml, story, sweep
+from floor_rig import COMES, DOORS, GONE, PUT_AT, QUICK, Room, config_toml, laser_toml, story, sweep
 
 from tms_agents.clocks import Clocks
 from tms_agents.config import read_config
@@ -33,7 +33,7 @@ class Bench:
             laser_toml('{ kind = "scip", host = "h" }', pose, name, laser.get(name, "")) for name, pose in poses.items()
         )
         path = folder / "floor.toml"
-        path.write_text(config_toml("lab", "http://127.0.0.1:1", text, more=QUICK))
+        path.write_text(config_toml("lab", "http://127.0.0.1:1", text, more=QUICK + DOORS))
         self.now, self.poses, self.room = start, poses, Room()
         clocks = Clocks(lambda: self.now, lambda: self.now, after=(saved or {}).get("t", -math.inf))
         numbers = itertools.count(50 if saved else 1)
