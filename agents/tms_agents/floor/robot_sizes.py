@@ -31,7 +31,7 @@ _MOST = 3
 
 
 @njit(cache=True)
-def _weigh(
+def weigh(
     x: float,
     y: float,
     halves: Array,
@@ -81,7 +81,7 @@ class RobotSizes:
                 continue
             self._at[label] = (x, y)
             cluster = whole[away.argmin()]
-            _weigh(cluster["x"], cluster["y"], _HALVES, self._sums, np.zeros(3), np.zeros(6), *scan)
+            weigh(cluster["x"], cluster["y"], _HALVES, self._sums, np.zeros(3), np.zeros(6), *scan)
             self._looks += 1
             self._decide()
 

@@ -14,6 +14,7 @@ from tms_agents.floor.dark import dark_width
 from tms_agents.floor.freespace import look
 from tms_agents.floor.nobodys import costs
 from tms_agents.floor.prints import follow
+from tms_agents.floor.robot_sizes import weigh
 
 _BEAMS, _HZ = 128, 20
 
@@ -47,5 +48,7 @@ def warm_up() -> None:
             ranges[np.abs(angles + 0.6) < 0.04] = 1.6
         estimator.scan("warm", t, ranges)
     estimator.labels()
-    # Nothing here is black.
+    # Nothing here is black, nothing is a robot.
     dark_width(0, 0, 1.0, ranges, ranges, 0.01)
+    one, scan = np.full(1, 0.2), (ranges, np.zeros(_BEAMS, np.int8), np.zeros((_BEAMS, 10)), np.zeros(3), -1.2, 0.02)
+    weigh(1.0, 0.0, one, np.zeros((1, 1)), np.zeros(3), np.zeros(6), *scan)

@@ -11,6 +11,8 @@ from floor_rooms import Circle, Room, Segment, box, together, walker
 from test_footprints import LENGTH, OPEN, WIDTH, Way, robot
 
 from tms_agents.floor import Appeared, FloorEstimator, Vanished
+from tms_agents.floor.robot_sizes import weigh
+from tms_agents.floor.warm import warm_up
 
 #: Somebody behind it is not seen, nor anybody beside the door, on either side.
 CUPBOARD = box(2.2, 2.6, 0.9, 0.3)
@@ -73,6 +75,14 @@ def test_a_robot_that_goes_by_itself_shows_how_large_it_is() -> None:
     assert size == pytest.approx((LENGTH / 2, WIDTH / 2), abs=0.03)
     assert len(names) == 1
     assert max(far) < 0.12
+
+
+def test_what_learns_is_compiled_before_the_first_robot_comes() -> None:
+    """Else the agent would stand still for seconds when one does."""
+    warm_up()
+    assert len(weigh.signatures) == 1
+    room([], robot(DRIVES)).play(16.0)
+    assert len(weigh.signatures) == 1
 
 
 def test_what_is_seen_from_one_side_alone_is_of_no_known_size() -> None:
