@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from tms_agents.floor.sight import from_edge
 from tms_agents.floor.state import pack, unpack
 
 Array = NDArray[np.float64]
+Places = deque[tuple[float, float]]
 
 #: So near a gate (m) people come; who is lost so near one has gone.
 _DOOR_M, _GONE_M = 1.0, 0.3
@@ -28,16 +30,15 @@ class Doors:
     """The ``gates``; where none is told, the edges of what is seen, and by which of them people have come."""
 
     def __init__(self, gates: Area) -> None:
-        self.gates = gates
+        self._gates = gates
         self._edges = np.zeros((0, 4))
         #: Where people began to be seen: at an edge of sight, and elsewhere, x, y (m).
-        self._ways: list[tuple[float, float]] = []
-        self._faint: list[tuple[float, float]] = []
+        self._ways, self._faint = Places(maxlen=_MOST), Places(maxlen=_MOST)
 
     @property
     def told(self) -> bool:
         """Whether gates are told."""
-        return bool(self.gates.polygons)
+        return bool(self._gates.polygons)
 
     @property
     def known(self) -> bool:
@@ -53,27 +54,27 @@ class Doors:
         if self.told or not self.known:
             return
         if from_edge(self._edges, x, y) < _EDGE_M:
-            self._ways = [*self._ways[-_MOST + 1 :], (x, y)]
+            self._ways.append((x, y))
         elif alone:
-            self._faint = [*self._faint[-_MOST + 1 :], (x, y)]
+            self._faint.append((x, y))
 
     def keeps(self, body: Any) -> bool:
         """Whether the body (`state.BODY`), of whom nothing is seen any more, was lost where nobody can leave."""
         if self.told:
-            return self.gates.distance(float(body["x"]), float(body["y"])) > _GONE_M
+            return self._gates.distance(float(body["x"]), float(body["y"])) > _GONE_M
         foot = "a" if body["a_seen"] > body["b_seen"] else "b"
         return self.known and not self._leads_out(float(body[f"{foot}x"]), float(body[f"{foot}y"]))
 
     def inside(self, x: float, y: float) -> bool:
         """Whether whoever begins to be seen at (x, y) m has not come in by a door, as far as doors are known."""
         if self.told:
-            return self.gates.distance(x, y) >= _DOOR_M
+            return self._gates.distance(x, y) >= _DOOR_M
         return self.known and not self._leads_out(x, y)
 
     def enters(self, x: float, y: float) -> bool:
         """Whether whoever begins to be seen at (x, y) m has come in by a door that is told or where others came."""
         if self.told:
-            return self.gates.distance(x, y) < _DOOR_M
+            return self._gates.distance(x, y) < _DOOR_M
         return from_edge(self._edges, x, y) < _EDGE_M and _nearest(self._ways, x, y, math.inf) < _DOOR_M
 
     def _leads_out(self, x: float, y: float) -> bool:
@@ -84,15 +85,17 @@ class Doors:
 
     def save(self) -> dict[str, Any]:
         """JSON values."""
-        return {"edges": pack(self._edges), "ways": self._ways, "faint": self._faint}
+        return {"edges": pack(self._edges), "ways": list(self._ways), "faint": list(self._faint)}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
         edges = saved["edges"]
         self._edges = unpack(edges, np.zeros((int(edges["shape"][0]), 4)))
-        self._ways, self._faint = ([(float(x), float(y)) for x, y in saved[name]] for name in ("ways", "faint"))
+        for name, places in (("ways", self._ways), ("faint", self._faint)):
+            places.clear()
+            places.extend((float(x), float(y)) for x, y in saved[name])
 
 
-def _nearest(places: list[tuple[float, float]], x: float, y: float, none: float) -> float:
+def _nearest(places: Places, x: float, y: float, none: float) -> float:
     """How far (m) from the nearest place; ``none`` where there is none."""
     return min((math.hypot(x - u, y - v) for u, v in places), default=none)

@@ -49,14 +49,20 @@ def edge(polygon: Array, x: float, y: float) -> tuple[float, float]:
     n = polygon.shape[0]
     best, edge_x, edge_y = np.inf, np.inf, np.inf
     for i in range(n):
-        ax, ay = polygon[i, 0], polygon[i, 1]
-        dx, dy = polygon[(i + 1) % n, 0] - ax, polygon[(i + 1) % n, 1] - ay
-        share = ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)
-        share = min(1.0, max(0.0, share))
-        away = norm(ax + share * dx - x, ay + share * dy - y)
+        j = (i + 1) % n
+        near_x, near_y = on_segment(polygon[i, 0], polygon[i, 1], polygon[j, 0], polygon[j, 1], x, y)
+        away = norm(near_x - x, near_y - y)
         if away < best:
-            best, edge_x, edge_y = away, ax + share * dx, ay + share * dy
+            best, edge_x, edge_y = away, near_x, near_y
     return edge_x, edge_y
+
+
+@njit(cache=True)
+def on_segment(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> tuple[float, float]:
+    """The place on the segment from a to b that is nearest to (x, y), m."""
+    dx, dy = bx - ax, by - ay
+    share = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)))
+    return ax + share * dx, ay + share * dy
 
 
 @njit(cache=True)

@@ -26,8 +26,8 @@ _WIDE_M, _BEAMS, _NEAR_M, _SEEN_S, _MOVED_M, _PUSHED = 0.22, 10, 0.35, 0.3, 0.06
 #: So many looks tell a size, if it fits so well in the mean, and so much (sum) better than those that differ by more
 #: than this (half, m); sizes that fit nearly as well (sum) are one with it, what is so much worse is not tried again.
 _LOOKS, _FITS, _BETTER, _APART_M, _ALIKE, _HOPELESS = 24, 0.85, 1.0, 0.06, 0.3, 3.0
-#: So many sizes are learned at most.
-_MOST = 3
+#: So many sizes are learned at most; the places of so many robots are remembered.
+_MOST, _ROBOTS = 3, 32
 
 
 @njit(cache=True)
@@ -80,6 +80,8 @@ class RobotSizes:
             if away.min() > _NEAR_M or np.hypot(x - u, y - v) < _MOVED_M:
                 continue
             self._at[label] = (x, y)
+            if len(self._at) > _ROBOTS:
+                del self._at[next(iter(self._at))]
             cluster = whole[away.argmin()]
             weigh(cluster["x"], cluster["y"], _HALVES, self._sums, np.zeros(3), np.zeros(6), *scan)
             self._looks += 1

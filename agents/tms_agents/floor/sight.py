@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.masks import on_segment
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
@@ -69,8 +70,6 @@ def from_edge(edges: Array, x: float, y: float) -> float:
     """How far (x, y) is from the nearest of the ``edges`` (k, 4), m; inf where there are none."""
     best = np.inf
     for i in range(edges.shape[0]):
-        ax, ay = edges[i, 0], edges[i, 1]
-        dx, dy = edges[i, 2] - ax, edges[i, 3] - ay
-        share = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)))
-        best = min(best, norm(ax + share * dx - x, ay + share * dy - y))
+        near_x, near_y = on_segment(edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3], x, y)
+        best = min(best, norm(near_x - x, near_y - y))
     return float(best)
