@@ -19,11 +19,12 @@ from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
 from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.left_feet import take_back
 from tms_agents.floor.masks import Area, Masks
-from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.objects import Objects
 from tms_agents.floor.own_feet import exchange
 from tms_agents.floor.patience import brings, has_left
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
+from tms_agents.floor.ripening import OBJECT
 from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure, note

@@ -11,10 +11,11 @@ from floor_rooms import Room, thing, together, walker
 from tms_agents.floor import Appeared, FloorSettings, Scene
 from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.nobodys import costs, known, nobodys
-from tms_agents.floor.objects import FURNITURE, OBJECT, Objects
+from tms_agents.floor.objects import Objects
 from tms_agents.floor.patience import brings
 from tms_agents.floor.prints import attend
 from tms_agents.floor.putting import count_feet, set_aside
+from tms_agents.floor.ripening import FURNITURE, OBJECT
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
@@ -34,10 +35,16 @@ def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
     return prints
 
 
-def told(prints: np.ndarray, kind: int = OBJECT, *, robots: bool = False) -> bool:
-    objects = Objects(empty(THING, 1), FloorSettings())
-    objects.robot_at = NOW - 10.0 if robots else -math.inf
-    return objects.ripe(prints, empty(BODY, 1), NOW, expected()) == [(0, kind)]
+def told(
+    prints: np.ndarray, kind: int = OBJECT, *, robots: bool = False, robot_m: float = 0.8, unseen_s: float = 0.0
+) -> bool:
+    """Whether it is; where there are ``robots`` one stands so far away and was last seen so long ago."""
+    objects, bodies = Objects(empty(THING, 1), FloorSettings()), empty(BODY, 1)
+    if robots:
+        objects.robot_at = NOW - 10.0
+        bodies["used"] = bodies["machine"] = 1
+        bodies["x"], bodies["y"], bodies["seen"] = prints["x"] + robot_m, prints["y"], NOW - unseen_s
+    return objects.ripe(prints, bodies, NOW, expected()) == [(0, kind)]
 
 
 @pytest.mark.parametrize(("off", "counted"), [(0.3, 1.0), (0.17, 0.25), (0.1, 0.0)])
@@ -86,6 +93,12 @@ def test_how_long_what_is_wide_rests_until_it_is_furniture_is_a_setting(absorb_s
 def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
     assert not told(resting(8.0, covered=81), robots=True)
     assert told(resting(8.0, covered=81, given=1), robots=True)
+
+
+@pytest.mark.parametrize(("away", "unseen_s", "known"), [(0.8, 0.0, False), (2.0, 0.0, True), (2.0, 5.0, False)])
+def test_what_a_robot_cannot_have_come_to_is_no_part_of_it(away: float, unseen_s: float, known: bool) -> None:
+    prints = resting(8.0, covered=81)
+    assert told(prints, robots=True, robot_m=away, unseen_s=unseen_s) == known
 
 
 @pytest.mark.parametrize(("seconds", "known"), [(50.0, False), (70.0, True)])

@@ -9,8 +9,9 @@ import pytest
 from floor_rooms import WALLS, Circle, Room, cast, walker
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, FloorSettings
-from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.objects import Objects
 from tms_agents.floor.own_feet import exchange
+from tms_agents.floor.ripening import OBJECT
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected, note
 from tms_agents.floor.state import BODY, PRINT, THING, empty

@@ -8,8 +8,9 @@ import pytest
 
 from tms_agents.floor import FloorSettings
 from tms_agents.floor.events import Appeared
-from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.objects import Objects
 from tms_agents.floor.patience import patience
+from tms_agents.floor.ripening import OBJECT
 from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
 

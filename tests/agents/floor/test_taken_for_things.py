@@ -10,9 +10,10 @@ from tms_agents.floor import Appeared
 from tms_agents.floor.background import BACKGROUND, FOREGROUND
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.build import SHOD, legs
-from tms_agents.floor.objects import OBJECT, Objects
+from tms_agents.floor.objects import Objects
 from tms_agents.floor.prints import ALONE, UNLIKE, attend, follow, lay_before
 from tms_agents.floor.review import LOST, review
+from tms_agents.floor.ripening import OBJECT
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.settings import FloorSettings
 from tms_agents.floor.shine import expected
