@@ -98,7 +98,7 @@ def find_ripe(
         nobodys = alone or given or astride or q.spare >= spare_s
         if not nobodys and (t - q.owned < gone_s or not _third(q, bodies, t, rest_s)):
             continue
-        if _somebodys(q, prints, j, bodies, robots, t):
+        if _somebodys(q, prints, j, bodies, t):
             continue
         if q.width < width_m:
             told = astride or t - q.rested >= patience(q, bodies, t, scattered)
@@ -111,15 +111,14 @@ def find_ripe(
 
 
 @njit(cache=True)
-def _somebodys(q: Any, prints: Any, j: int, bodies: Any, robots: bool, t: float) -> bool:
+def _somebodys(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
     """Whether the print j may be a foot of somebody unknown or lost there: hidden in part, wide, or there are two.
 
-    Where there are ``robots``, what stands behind something new, and is never seen whole, may be a part of one near it.
+    What stands behind something new, and is never seen whole, may be a part of a robot that is near it.
     """
     if q.given:
         return False
-    hidden = q.covered > _COVERED * q.hits and t - q.rested < _PARKS_S
-    if robots and hidden and _robot_near(q, bodies, t):
+    if q.covered > _COVERED * q.hits and t - q.rested < _PARKS_S and _robot_near(q, bodies, t):
         return True
     if t - q.first > _STANDS_S:
         return False
