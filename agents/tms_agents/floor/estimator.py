@@ -24,7 +24,7 @@ from tms_agents.floor.own_feet import exchange
 from tms_agents.floor.patience import brings, has_left
 from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
-from tms_agents.floor.ripening import OBJECT
+from tms_agents.floor.ripening import OBJECT, joins
 from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure, note
@@ -178,7 +178,8 @@ class FloorEstimator:
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:
-            for index, kind in objects.ripe(prints, bodies, t, scattered):
+            intact = joins(prints, bodies, t) and not self._pieces(t)
+            for index, kind in objects.ripe(prints, bodies, t, scattered, intact):
                 appeared += self._settle(index, kind, t)
         self._association.settle()
         self._protect(view, clusters, of, somebodys)

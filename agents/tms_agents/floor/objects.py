@@ -124,10 +124,10 @@ class Objects:
                 self.walked.append((float(thing["seen"]), *_xy(thing)))
         return events
 
-    def ripe(self, prints: Any, bodies: Any, t: float, scattered: Array) -> list[tuple[int, int]]:
+    def ripe(self, prints: Any, bodies: Any, t: float, scattered: Array, intact: bool = False) -> list[tuple[int, int]]:
         """Prints that rest, and what each is: `ripening.OBJECT` or `FURNITURE`.
 
-        ``scattered`` (3,) is what `shine.scatter` has learned.
+        ``scattered`` (3,) is what `shine.scatter` has learned; ``intact``: nothing has gone from the room.
         """
         if ((bodies["used"] == 1) & (bodies["machine"] == 1)).any():
             self.robot_at = t
@@ -144,6 +144,7 @@ class Objects:
             s.absorb_s,
             s.object_width_m,
             scattered,
+            intact,
             self._ripe,
         ):
             return []
@@ -168,7 +169,7 @@ class Objects:
         thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]
         thing["hits"] = min(int(print_["whole"]), 5)
         thing["var"] = _SURFACE_VAR + 1e-4 / (thing["hits"] + 1)
-        thing["since"], thing["seen"], thing["free_at"] = print_["rested"], t, t
+        thing["since"], thing["seen"], thing["free_at"] = print_["rested"], print_["last"], print_["last"]
         thing["free"], thing["doubt"], thing["part"], thing["part_by"], thing["part_hits"] = 0.0, 0.0, 0.0, -1, 0
         hits, mutes, looks = (int(print_[name]) for name in ("hits", "mutes", "looks"))
         thing["rate"] = min(0.99, max(0.2, hits / max(looks + mutes, 1)))

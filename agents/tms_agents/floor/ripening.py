@@ -45,8 +45,11 @@ _LEANS_S = 6.0
 #: What joins it may be a thing while who stands or drives beside both has not gone, for so long (s).
 _JOINED_S = 3.0
 #: A part of something is joined to it in this share of the scans; what somebody brought who stayed for so long (s), and
-#: lies close to something, in less than that.
-_JOINED, _STAYS_S, _CLOSE = 0.5, 1.0, 0.75
+#: lies close to something, in less than that; where nothing has gone from the room it is so in nearly all of them.
+_JOINED, _STAYS_S, _CLOSE, _FUSED = 0.5, 1.0, 0.75, 0.9
+#: What is hidden for so long (s) was in view for so long (s), in such a share of its sightings whole, while everybody
+#: near it showed both feet elsewhere for so long (s).
+_HIDDEN_S, _SEEN_S, _SEEN, _SHOWN_S = 0.5, 1.0, 0.3, 0.4
 
 
 @njit(cache=True)
@@ -60,15 +63,19 @@ def find_ripe(
     absorb_s: float,
     width_m: float,
     scattered: Array,
+    intact: bool,
     ripe: NDArray[np.int64],
 ) -> int:
-    """Prints that are an `OBJECT` or `FURNITURE` by now, or will be one (`WAITS`), into ``ripe``; how many."""
+    """Prints that are an `OBJECT` or `FURNITURE` by now, or will be one (`WAITS`), into ``ripe``; how many.
+
+    ``intact``: what is new was put there by somebody, nothing has gone from the room.
+    """
     count = 0
     for j in range(prints.size):
         q = prints[j]
         ripe[j] = 0
         # What is not there now may be a foot that has just been lifted.
-        if not q.used or q.last < t or q.revealed:
+        if not q.used or q.revealed or (q.last < t and not _was_shown(q, t)):
             continue
         astride = q.owner >= 0 and _astride(q, prints, j, bodies, t)
         if q.owner >= 0 and not astride:
@@ -80,7 +87,8 @@ def find_ripe(
         leans = age > (_LEANS_S if t - q.busy < alone_s else _JOINED_S if q.width < width_m else 0.0)
         if not astride and q.given == 0 and may_be_his(q, prints, bodies, t, scattered):
             continue
-        if q.attached > (_CLOSE if _brought(q) else _JOINED) and q.given == 0:
+        joined = _FUSED if intact else _CLOSE if _brought(q) else _JOINED
+        if q.attached > joined and q.given == 0:
             if leans:
                 ripe[j] = FURNITURE
                 count += 1
@@ -108,6 +116,27 @@ def find_ripe(
             ripe[j] = FURNITURE
             count += 1
     return count
+
+
+@njit(cache=True)
+def joins(prints: Any, bodies: Any, t: float) -> bool:
+    """Whether one of the prints seen now is a part of the room, or close to it, while a person is there."""
+    there = False
+    for b in range(bodies.size):
+        there = there or (bodies[b].used and bodies[b].confirmed and not bodies[b].robot)
+    if there:
+        for j in range(prints.size):
+            q = prints[j]
+            if q.used and q.last == t and not q.revealed and q.attached > _JOINED:
+                return True
+    return False
+
+
+@njit(cache=True)
+def _was_shown(q: Any, t: float) -> bool:
+    """Whether the print, hidden now, was in view long enough, and nobody's foot."""
+    seen = q.last - q.rested > _SEEN_S and q.whole >= _SEEN * q.hits
+    return bool(seen and q.spare >= _SHOWN_S and t - q.last > _HIDDEN_S)
 
 
 @njit(cache=True)

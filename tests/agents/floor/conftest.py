@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from server_process import ServerProcess
 
-sys.path.append(str(Path(__file__).parent))  # for floor_rig
+sys.path.append(str(Path(__file__).parent))  # for floor_rig and floor_prints
 
 from floor_rig import Rig, config_toml
 

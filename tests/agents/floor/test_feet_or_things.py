@@ -6,45 +6,18 @@ import math
 
 import numpy as np
 import pytest
+from floor_prints import NOW, resting
 from floor_rooms import Room, thing, together, walker
 
-from tms_agents.floor import Appeared, FloorSettings, Scene
+from tms_agents.floor import Appeared, Scene
 from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.nobodys import costs, known, nobodys
-from tms_agents.floor.objects import Objects
 from tms_agents.floor.patience import brings
 from tms_agents.floor.prints import attend
 from tms_agents.floor.putting import count_feet, set_aside
-from tms_agents.floor.ripening import FURNITURE, OBJECT
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected
-from tms_agents.floor.state import BODY, PRINT, THING, empty
-
-NOW = 100.0
-
-
-def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
-    """A print in full sight since so long, that nobody came near."""
-    prints = empty(PRINT, 1)
-    hits = round(10 * seconds) + 1
-    values = {"used": 1, "first": NOW - seconds, "rested": NOW - seconds, "last": NOW, "width": width, "owner": -1}
-    values |= {"hits": hits, "looks": hits, "whole": hits, "beams": 8, "spacing": 0.01, "whose": -1}
-    values |= {"owned": -1e9, "busy": -1e9, "silent": -1e9}
-    for name, value in (values | fields).items():
-        prints[name] = value
-    return prints
-
-
-def told(
-    prints: np.ndarray, kind: int = OBJECT, *, robots: bool = False, robot_m: float = 0.8, unseen_s: float = 0.0
-) -> bool:
-    """Whether it is; where there are ``robots`` one stands so far away and was last seen so long ago."""
-    objects, bodies = Objects(empty(THING, 1), FloorSettings()), empty(BODY, 1)
-    if robots:
-        objects.robot_at = NOW - 10.0
-        bodies["used"] = bodies["machine"] = 1
-        bodies["x"], bodies["y"], bodies["seen"] = prints["x"] + robot_m, prints["y"], NOW - unseen_s
-    return objects.ripe(prints, bodies, NOW, expected()) == [(0, kind)]
+from tms_agents.floor.state import BODY, PRINT, empty
 
 
 @pytest.mark.parametrize(("off", "counted"), [(0.3, 1.0), (0.17, 0.25), (0.1, 0.0)])
@@ -59,62 +32,6 @@ def test_what_lies_close_to_one_of_two_feet_is_told_from_it_later_and_what_touch
     bodies["ay"] = bodies["by"] = prints["y"]
     count_feet(prints, bodies, NOW, 1.0)
     assert prints["spare"][0] == pytest.approx(counted)
-
-
-@pytest.mark.parametrize(
-    ("attached", "stayed_s", "whole", "kind"),
-    [(0.6, 2.0, 300, OBJECT), (0.6, 0.5, 300, FURNITURE), (0.6, 2.0, 100, FURNITURE), (0.9, 2.0, 300, FURNITURE)],
-)
-def test_what_somebody_put_down_close_to_a_wall_is_a_thing_though_it_often_seems_a_part_of_it(
-    attached: float, stayed_s: float, whole: int, kind: int
-) -> None:
-    assert told(resting(30.0, attached=attached, whole=whole, busy=NOW - 30.0 + stayed_s), kind)
-
-
-def test_what_is_as_wide_as_a_shoe_from_its_side_waits() -> None:
-    assert told(resting(1.5))
-    assert not told(resting(1.5, width=0.22))
-    assert told(resting(4.5, width=0.22))
-
-
-def test_it_waits_for_longer_where_somebody_stood_on_it() -> None:
-    assert not told(resting(20.0, width=0.22, owned=NOW - 5.0, busy=NOW - 5.0))
-    assert told(resting(20.0, width=0.12, owned=NOW - 5.0, busy=NOW - 5.0))
-    assert told(resting(30.0, width=0.22, owned=NOW - 12.0, busy=NOW - 12.0))
-
-
-@pytest.mark.parametrize(("absorb_s", "furniture"), [(2.0, True), (8.0, False)])
-def test_how_long_what_is_wide_rests_until_it_is_furniture_is_a_setting(absorb_s: float, furniture: bool) -> None:
-    objects = Objects(empty(THING, 1), FloorSettings(absorb_s=absorb_s))
-    found = objects.ripe(resting(5.0, width=0.3), empty(BODY, 1), NOW, expected())
-    assert found == ([(0, FURNITURE)] if furniture else [])
-
-
-def test_what_a_hand_put_behind_something_is_no_part_of_a_robot() -> None:
-    assert not told(resting(8.0, covered=81), robots=True)
-    assert told(resting(8.0, covered=81, given=1), robots=True)
-
-
-@pytest.mark.parametrize(("away", "unseen_s", "known"), [(0.8, 0.0, False), (2.0, 0.0, True), (2.0, 5.0, False)])
-def test_what_a_robot_cannot_have_come_to_is_no_part_of_it(away: float, unseen_s: float, known: bool) -> None:
-    prints = resting(8.0, covered=81)
-    assert told(prints, robots=True, robot_m=away, unseen_s=unseen_s) == known
-
-
-@pytest.mark.parametrize(("seconds", "known"), [(50.0, False), (70.0, True)])
-def test_what_lies_behind_something_for_a_minute_is_no_part_of_a_robot_though_people_pass(
-    seconds: float, known: bool
-) -> None:
-    """Whoever passes hides it for a moment: it is where it was when it comes out again."""
-    prints = resting(seconds, covered=round(10 * seconds), busy=NOW - 15.0)
-    prints["first"] = NOW - 10.0
-    assert told(prints, robots=True) == known
-
-
-@pytest.mark.parametrize(("whole", "known"), [(20, True), (5, False)])
-def test_what_a_hand_put_in_full_view_is_no_part_of_a_robot(whole: int, known: bool) -> None:
-    """It is told before somebody, or the robot, stands before it."""
-    assert told(resting(2.0, busy=NOW, given=1, whole=whole), robots=True) == known
 
 
 @pytest.mark.parametrize(
