@@ -178,7 +178,7 @@ class FloorEstimator:
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:
-            intact = joins(prints, bodies, t) and not self._pieces(t)
+            intact = joins(prints, bodies, t) and not self._furniture.lacks(self._pieces(t))
             for index, kind in objects.ripe(prints, bodies, t, scattered, intact):
                 appeared += self._settle(index, kind, t)
         self._association.settle()

@@ -37,6 +37,8 @@ _ALIKE = 0.1
 _SAME_M, _HIDDEN_M = 0.05, 0.15
 #: A piece has gone when its beams have passed its place for so long (s), and was background by this weight.
 _GONE_S, _WEIGHT = 0.8, 0.25
+#: So wide (m) is an edge that noise hides now and then.
+_GLIMPSED_M = 0.025
 #: It cannot stand at its new place so long (s) before it is seen to have gone, unless who pushes it hides that.
 _EARLY_S = 2.0
 
@@ -195,6 +197,11 @@ class Furniture:
             return False
         self._found.append((t, best.x, best.y))
         return True
+
+    @staticmethod
+    def lacks(pieces: list[Piece]) -> bool:
+        """Whether anything has gone, and not only an edge that noise hides now and then."""
+        return any(piece.width > _GLIMPSED_M for piece in pieces)
 
     @staticmethod
     def was(begun: Any, width: float, pieces: list[Piece]) -> bool:

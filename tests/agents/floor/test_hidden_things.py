@@ -220,3 +220,10 @@ def test_a_thing_is_no_piece_of_furniture_that_was_half_as_wide(piece: float, is
     put = thin((2.0, 2.0))
     put["width"], put["spacing"] = 0.076, 0.015
     assert Furniture().explains(put[0], put, [Piece(1.0, 2.5, 2.0, piece, 1.0)], 5.0) == is_it
+
+
+@pytest.mark.parametrize(("widths", "lacks"), [((), False), ((0.02, 0.015), False), ((0.02, 0.03), True)])
+def test_an_edge_that_noise_hides_is_nothing_that_has_gone_from_the_room(
+    widths: tuple[float, ...], lacks: bool
+) -> None:
+    assert Furniture.lacks([Piece(1.0, 2.0, 2.0, width, 1.0) for width in widths]) == lacks
