@@ -19,6 +19,9 @@ _COMPONENTS = 4
 _SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 #: A settled component weighs so much; what intermittent beams show less often is not believed.
 _WEIGHT = 0.06
+#: What is faint, because it is dark or far, echoes less often; it is believed if it weighs so much and goes on for so
+#: long (m), differs so little from beam to beam (m), and at most so many beams between bring nothing.
+_FAINT, _WALL_M, _SLANT_M, _GAP = 0.01, 0.8, 0.1, 3
 #: A surface whose place has been looked past for so long (s) has gone.
 _GONE_S = 5.0
 #: The ranges of one surface differ so little from beam to beam (m).
@@ -26,13 +29,43 @@ _SURFACE_M = 0.05
 
 
 @njit(cache=True)
-def longest_of(centre: Array, weight: Array, least: float, i: int) -> float:
-    """The farthest component of beam i that is believed, m; 0 if there is none."""
+def longest_of(centre: Array, weight: Array, least: Array, i: int) -> float:
+    """The farthest component of beam i that is believed, m; 0 if there is none; ``least`` (n,) as `_faint` finds it."""
     far = 0.0
     for j in range(centre.shape[1]):
-        if weight[i, j] > least and centre[i, j] > far:
+        if weight[i, j] > least[i] and centre[i, j] > far:
             far = centre[i, j]
     return far
+
+
+@njit(cache=True)
+def _faint(centre: Array, weight: Array, usual: float, seldom: float, step: float, least: Array) -> None:
+    """Fill ``least`` (n,): what components must weigh to be believed, ``usual`` or what the heaviest has, if it is
+    more than ``seldom`` and a part of a long surface.
+
+    centre, weight: (n, k) components, m; step: rad between beams.
+    """
+    n, k = centre.shape
+    least[:] = usual
+    a, last, far, long_m = -1, -1, 0.0, 0.0
+    for i in range(n + 1):
+        r, most = 0.0, seldom
+        if i < n:
+            for j in range(k):
+                if weight[i, j] > most:
+                    r, most = centre[i, j], weight[i, j]
+            if r == 0.0 and i - last <= _GAP:
+                continue
+        if a >= 0 and r > 0.0 and abs(r - far) < _SLANT_M * (i - last):
+            long_m += r * step * (i - last)
+        else:
+            if a >= 0 and long_m > _WALL_M:
+                for b in range(a, last + 1):
+                    heaviest = weight[b].max()
+                    if seldom < heaviest <= usual:
+                        least[b] = 0.99 * heaviest
+            a, long_m = (i if r > 0.0 else -1), 0.0
+        last, far = i, r
 
 
 @njit(cache=True)
@@ -43,7 +76,7 @@ def _classify(
     weight: Array,
     empty: Array,
     missing: Array,
-    least: float,
+    least: Array,
     sigmas: float,
     threshold: float,
     states: States,
@@ -79,7 +112,7 @@ def _classify(
         lowest, highest = np.inf, 0.0
         for b in range(max(0, i - 1), min(n, i + 2)):
             for j in range(k):
-                if weight[b, j] > least:
+                if weight[b, j] > least[b]:
                     margin = max(threshold, sigmas * sigma[b, j])
                     if abs(r - centre[b, j]) <= margin:
                         state = BACKGROUND
@@ -112,7 +145,7 @@ def _steady(
     sigma: Array,
     weight: Array,
     missing: Array,
-    least: float,
+    least: Array,
     sigmas: float,
     threshold: float,
     i: int,
@@ -121,17 +154,17 @@ def _steady(
     """Whether the range r of beam i is near a component of its own that has not gone: so it is mostly."""
     for j in range(centre.shape[1]):
         near = abs(r - centre[i, j]) <= max(threshold, sigmas * sigma[i, j])
-        if weight[i, j] > least and near and not missing[i, j] > _GONE_S:
+        if weight[i, j] > least[i] and near and not missing[i, j] > _GONE_S:
             return True
     return False
 
 
 @njit(cache=True)
-def _shown(centre: Array, weight: Array, missing: Array, least: float, i: int, r: float) -> bool:
+def _shown(centre: Array, weight: Array, missing: Array, least: Array, i: int, r: float) -> bool:
     """Whether something that has gone was at the range r of beam i."""
     if 0 <= i < centre.shape[0]:
         for j in range(centre.shape[1]):
-            if weight[i, j] > least and missing[i, j] > _GONE_S and abs(centre[i, j] - r) < _SURFACE_M:
+            if weight[i, j] > least[i] and missing[i, j] > _GONE_S and abs(centre[i, j] - r) < _SURFACE_M:
                 return True
     return False
 
@@ -142,7 +175,7 @@ def _whole(
     centre: Array,
     weight: Array,
     missing: Array,
-    least: float,
+    least: Array,
     states: States,
     back: NDArray[np.bool_],
 ) -> None:
@@ -285,8 +318,8 @@ def _adopt(
 class Background:
     """The background of one sensor with n beams. Learned with people present: who only passes weighs little."""
 
-    def __init__(self, n: int, settings: FloorSettings) -> None:
-        self._settings = settings
+    def __init__(self, n: int, step_rad: float, settings: FloorSettings) -> None:
+        self._settings, self._step = settings, abs(step_rad)
         self.centre = np.zeros((n, _COMPONENTS))
         self.sigma = np.full((n, _COMPONENTS), 0.01)
         self.weight = np.zeros((n, _COMPONENTS))
@@ -298,6 +331,7 @@ class Background:
         self.missing = np.zeros((n, _COMPONENTS))
         self.seconds = 0.0
         self._back = np.zeros(n, np.bool_)
+        self._least = np.full(n, _WEIGHT)
         self._scans = 0
 
     @property
@@ -314,7 +348,8 @@ class Background:
         """What each beam shows, (n,); the array is reused."""
         # At first little has been seen: only what was there most of the time counts.
         young = max(0.0, 1.0 - self.seconds / self._settings.learn_s)
-        least = _WEIGHT + 0.34 * young
+        seldom = min(_FAINT, 0.5 / max(self._scans, 1)) if young else _FAINT
+        _faint(self.centre, self.weight, _WEIGHT + 0.34 * young, seldom, self._step, self._least)
         _classify(
             ranges,
             self.centre,
@@ -322,14 +357,14 @@ class Background:
             self.weight,
             self.empty,
             self.missing,
-            least,
+            self._least,
             self._settings.sigmas,
             self._settings.threshold_m,
             self.states,
             self.longest,
             self._back,
         )
-        _whole(ranges, self.centre, self.weight, self.missing, least, self.states, self._back)
+        _whole(ranges, self.centre, self.weight, self.missing, self._least, self.states, self._back)
         return self.states
 
     def learn(self, ranges: Array, keep: NDArray[np.bool_], dt: float) -> None:

@@ -26,6 +26,7 @@ from tms_agents.floor.prints import attend, follow
 from tms_agents.floor.putting import count_feet, set_aside
 from tms_agents.floor.ripening import OBJECT, joins
 from tms_agents.floor.robots import gather, recognize, sizes
+from tms_agents.floor.segmentation import backed
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure, note
 from tms_agents.floor.sight import edges_of_sight, looks_past
@@ -139,6 +140,8 @@ class FloorEstimator:
             self._looks,
         )
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
+        if not view.background.learned:
+            clusters = clusters[: backed(clusters)]
         clusters = clusters[: self._footprints.step(view, clusters, t, lambda: self._pieces(t))]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]

@@ -49,6 +49,8 @@ _SHRED, _SHRED_M, _LACKING = 2, 0.1, 1
 #: a little more than so many times as far as that beam is behind the one before it (m), or times the distance of two
 #: beams, whichever is more. What is farther behind is the other foot.
 _AHEAD_M, _BEHIND_M, _MORE_M, _BENDS, _SPACINGS = 0.1, 0.2, 0.03, 4.0, 7.0
+#: So few beams may be a part of what is not known yet.
+_SPECK = 2
 #: What is seen in a mirror is what is seen directly if it is so near it (m, and share of the width).
 _SAME_M, _SAME = 0.06, 0.25
 #: A surface goes on so smoothly from beam to beam (m, and per metre of range: noise).
@@ -252,6 +254,21 @@ def _once(clusters: Any) -> int:
         if kept != k:
             clusters[kept] = c
         kept += 1
+    return kept
+
+
+@njit(cache=True)
+def backed(clusters: Any) -> int:
+    """Move what stands before something known, or shows more than `_SPECK` beams, to the front of ``clusters`` (m,).
+
+    How many these are. While a room is learned, what else is seen may be a wall that seldom echoes.
+    """
+    kept = 0
+    for k in range(clusters.size):
+        if clusters[k].n > _SPECK or np.isfinite(clusters[k].gap):
+            if kept != k:
+                clusters[kept] = clusters[k]
+            kept += 1
     return kept
 
 

@@ -45,7 +45,7 @@ class View:
         self.index, self.sensor, self.mirrors = index, sensor, mirrors
         self.n = angles.size
         self.first, self.step = float(angles[0]), float(steps.mean())
-        self.background = Background(self.n, settings)
+        self.background = Background(self.n, self.step, settings)
         self.segment = Segmenter(np.abs(np.append(steps, steps[-1])), settings.grazing_rad)
         self.ranges = np.zeros(self.n)
         self.claimed = np.zeros(self.n, np.bool_)

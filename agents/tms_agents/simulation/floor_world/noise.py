@@ -58,7 +58,7 @@ class LaserErrors:
         ranges = np.round(ranges / p.quantum_m) * p.quantum_m
         chance = rng.random((3, n))
         self._silent = self._intermittent & (chance[0] < np.where(self._silent, p.silent_again, p.silent_next))
-        none = self._silent | (chance[1] < p.isolated) | (chance[2] > seen.echo)
+        none = self._silent | (chance[1] < p.isolated) | (chance[2] > seen.echo * self._strength(near, seen.reflectivity))
         none |= (ranges > self._laser.range_max_m) | ~np.isfinite(ranges)
         ranges[none] = np.inf
         ranges[ranges < self._laser.range_min_m] = np.nan
@@ -69,6 +69,14 @@ class LaserErrors:
         light[back] += rng.normal(0, 25, int(back.sum()))
         owners = np.where(back & ~mixed, seen.owners, NOBODY)
         return Measured(ranges, np.maximum(np.round(light), 0.0), owners)
+
+    def _strength(self, ranges: Floats, reflectivity: Floats) -> Floats:
+        """The share (n,) of beams whose echo is not too weak."""
+        p = self._laser.noise
+        if not math.isfinite(p.fades_at_m):
+            return np.ones(ranges.size)
+        weak = (ranges - p.fades_at_m * reflectivity**p.fades_power) / p.fades_over_m
+        return np.asarray(1 / (1 + np.exp(weak)))
 
     def _drift(self, t: float) -> float:
         """Metres: it warms up, and wanders."""
