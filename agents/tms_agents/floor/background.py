@@ -21,7 +21,9 @@ _SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 _WEIGHT = 0.06
 #: What is faint, because it is dark or far, echoes less often; it is believed if it weighs so much and goes on for so
 #: long (m), differs so little from beam to beam (m), and at most so many beams between bring nothing.
-_FAINT, _WALL_M, _SLANT_M, _GAP = 0.01, 0.8, 0.1, 3
+_FAINT, _WALL_M, _SLANT_M, _GAP = 0.003, 0.8, 0.1, 3
+#: What is silent less often than this is missed where nothing comes back.
+_SILENT = 0.3
 #: A surface whose place has been looked past for so long (s) has gone.
 _GONE_S = 5.0
 #: The ranges of one surface differ so little from beam to beam (m).
@@ -81,11 +83,13 @@ def _classify(
     threshold: float,
     states: States,
     longest: Array,
+    steady: Array,
     back: NDArray[np.bool_],
 ) -> None:
     """Fill ``states`` (n,) and ``longest`` (n,) m, the farthest background of each beam (inf: none).
 
-    ``back`` (n,) becomes which beams show nothing but what had gone.
+    ``steady`` (n,) m becomes the same where it is hardly ever silent, ``back`` (n,) which beams show nothing but what
+    had gone.
 
     centre, sigma, weight: (n, k) components, m; empty: (n,) weight of no echo. A range is background if it is near a
     component of the beam or of one beside it (edges jitter), foreground if it is shorter than the longest component.
@@ -96,6 +100,7 @@ def _classify(
         if far == 0.0:
             far = np.inf
         longest[i] = far
+        steady[i] = far if empty[i] < _SILENT else np.inf
         back[i] = False
         r = ranges[i]
         if np.isnan(r):
@@ -327,7 +332,7 @@ class Background:
         self.beyond = np.zeros(n)
         self.beyond_at = np.zeros(n)
         self.states = np.zeros(n, np.int8)
-        self.longest = np.full(n, np.inf)
+        self.longest, self.steady = np.full(n, np.inf), np.full(n, np.inf)
         self.missing = np.zeros((n, _COMPONENTS))
         self.seconds = 0.0
         self._back = np.zeros(n, np.bool_)
@@ -362,6 +367,7 @@ class Background:
             self._settings.threshold_m,
             self.states,
             self.longest,
+            self.steady,
             self._back,
         )
         _whole(ranges, self.centre, self.weight, self.missing, self._least, self.states, self._back)

@@ -145,7 +145,7 @@ class FloorEstimator:
         clusters = clusters[: self._footprints.step(view, clusters, t, lambda: self._pieces(t))]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]
-        follow(clusters, of, prints, view.index, t, *view.sight)
+        follow(clusters, of, prints, view.index, t, view.background.steady, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
         marks = self._marks[: clusters.size]
         increment_s = view.sensor.sweep.time_increment_s

@@ -278,15 +278,30 @@ def _towards(x: float, y: float, half: float, pose: Array, first: float, step: f
 
 @njit(cache=True)
 def silent(
-    x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
+    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
 ) -> bool:
-    """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy."""
+    """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy.
+
+    ``steady`` (n,) m: the background where it is hardly ever silent; inf elsewhere.
+    """
     away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
     count = 0
     for i in range(low, high + 1):
-        if not np.isfinite(ranges[i]) and np.isfinite(longest[i]) and longest[i] > away:
+        if not np.isfinite(ranges[i]) and np.isfinite(steady[i]) and steady[i] > away:
             count += 1
     return bool(count > 0 and 2 * count >= high - low + 1)
+
+
+@njit(cache=True)
+def blank(
+    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly (``steady``, (n,) m)."""
+    _, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+    for i in range(low, high + 1):
+        if not np.isinf(ranges[i]) or np.isfinite(steady[i]):
+            return False
+    return bool(high >= low)
 
 
 @njit(cache=True)

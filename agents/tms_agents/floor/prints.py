@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.build import SHOD, SHOES
-from tms_agents.floor.freespace import FREE, WALLED, clear, silent
+from tms_agents.floor.freespace import FREE, UNSEEN, WALLED, blank, clear, silent
 from tms_agents.floor.norm import norm
 from tms_agents.floor.shine import STRANGE, strangeness
 
@@ -88,6 +88,7 @@ def follow(
     prints: Any,
     sensor: int,
     t: float,
+    steady: Array,
     ranges: Array,
     states: NDArray[np.int8],
     longest: Array,
@@ -95,7 +96,10 @@ def follow(
     first: float,
     step: float,
 ) -> None:
-    """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster."""
+    """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster.
+
+    ``steady`` (n,) m is the background where it is hardly ever silent (inf: elsewhere), the rest as `clear` takes.
+    """
     m, p = clusters.size, prints.size
     of[:] = -1
     near = np.full(m, np.inf)
@@ -185,7 +189,7 @@ def follow(
             continue
         if t - q.last > _HIDDEN_S:
             q.used = 0
-        elif silent(q.x, q.y, 0.5 * q.width, ranges, longest, pose, first, step):
+        elif silent(q.x, q.y, 0.5 * q.width, ranges, steady, pose, first, step):
             q.silent = t
             if sensor == q.sensor:
                 q.mutes += 1
@@ -195,7 +199,8 @@ def follow(
             view = clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step)
             # In the gap between two walls only the beam that met it tells that it is not there now.
             passed = view == WALLED and q.beams < _SPECK and sensor == q.sensor and _passed(q, ranges)
-            if (view == FREE and sensor == q.sensor) or passed:
+            faint = view == UNSEEN and blank(q.x, q.y, 0.5 * q.width, ranges, steady, pose, first, step)
+            if (sensor == q.sensor and (view == FREE or faint)) or passed:
                 q.looks += 1
             if view == FREE and t - max(q.last, q.silent) > _GONE_S:
                 q.used = 0
