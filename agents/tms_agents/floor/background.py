@@ -21,7 +21,9 @@ _SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 _WEIGHT = 0.06
 #: What is faint, because it is dark or far, echoes less often; it is believed if it weighs so much and goes on for so
 #: long (m), differs so little from beam to beam (m), and at most so many beams between bring nothing.
-_FAINT, _WALL_M, _SLANT_M, _GAP = 0.003, 0.8, 0.1, 3
+_FAINT, _WALL_M, _SLANT_M, _GAP = 0.002, 0.8, 0.1, 3
+#: So is what comes back mostly, in this share of the echoes, so many times, each so long (s) after the one before.
+_MOST, _AGAIN, _LATER_S = 0.5, 3, 1.0
 #: What is silent less often than this is missed where nothing comes back.
 _SILENT = 0.3
 #: A surface whose place has been looked past for so long (s) has gone.
@@ -41,19 +43,23 @@ def longest_of(centre: Array, weight: Array, least: Array, i: int) -> float:
 
 
 @njit(cache=True)
-def _faint(centre: Array, weight: Array, usual: float, seldom: float, step: float, least: Array) -> None:
+def _faint(
+    centre: Array, weight: Array, empty: Array, times: Array, usual: float, seldom: float, step: float, least: Array
+) -> None:
     """Fill ``least`` (n,): what components must weigh to be believed, ``usual`` or what the heaviest has, if it is
-    more than ``seldom`` and a part of a long surface.
+    more than ``seldom`` and a part of a long surface, or most of what ever comes back, again and again.
 
-    centre, weight: (n, k) components, m; step: rad between beams.
+    centre, weight, times: (n, k) components, m; empty: (n,) weight of no echo; step: rad between beams.
     """
     n, k = centre.shape
-    least[:] = usual
     a, last, far, long_m = -1, -1, 0.0, 0.0
     for i in range(n + 1):
         r, most = 0.0, seldom
         if i < n:
+            least[i] = usual
             for j in range(k):
+                if times[i, j] >= _AGAIN and weight[i, j] > _MOST * (1.0 - empty[i]):
+                    least[i] = min(usual, 0.99 * weight[i, j])
                 if weight[i, j] > most:
                     r, most = centre[i, j], weight[i, j]
             if r == 0.0 and i - last <= _GAP:
@@ -64,7 +70,7 @@ def _faint(centre: Array, weight: Array, usual: float, seldom: float, step: floa
             if a >= 0 and long_m > _WALL_M:
                 for b in range(a, last + 1):
                     heaviest = weight[b].max()
-                    if seldom < heaviest <= usual:
+                    if seldom < heaviest <= least[b]:
                         least[b] = 0.99 * heaviest
             a, long_m = (i if r > 0.0 else -1), 0.0
         last, far = i, r
@@ -227,13 +233,17 @@ def _learn(
     beyond: Array,
     beyond_at: Array,
     missing: Array,
+    seconds: float,
+    times: Array,
+    seen_at: Array,
 ) -> None:
     """Update the components in place, except of the beams in ``keep`` (n,): those show something known.
 
     usual: by how much this scan counts, slow: where it shows something nearer than the background; pull: by how much
     the nearest component follows. ``beyond`` (n,) s counts how long a beam has passed its background and ``beyond_at``
     (n,) m where to: then the background there has gone. ``missing`` (n, k) s is for how long beams have passed the
-    place of a component since it was last seen.
+    place of a component since it was last seen. ``times`` (n, k) is how often each was seen, ``seen_at`` (n, k) when
+    last, ``seconds`` the time now.
     """
     n, k = centre.shape
     for i in range(n):
@@ -265,6 +275,7 @@ def _learn(
             if states[i] != FOREGROUND:
                 missing[i, best] = 0.0
             weight[i, best] += rate
+            times[i, best] += seconds - seen_at[i, best] > _LATER_S
             gain = max(pull, rate)
             step = r - centre[i, best]
             centre[i, best] += gain * step
@@ -273,7 +284,8 @@ def _learn(
         else:
             best = least
             centre[i, best], sigma[i, best], weight[i, best] = r, 2.0 * floor, rate
-            missing[i, best] = 0.0
+            missing[i, best], times[i, best] = 0.0, 1.0
+        seen_at[i, best] = seconds
         if states[i] == BEYOND:
             if abs(r - beyond_at[i]) > 4.0 * threshold:
                 beyond[i] = 0.0
@@ -334,6 +346,7 @@ class Background:
         self.states = np.zeros(n, np.int8)
         self.longest, self.steady = np.full(n, np.inf), np.full(n, np.inf)
         self.missing = np.zeros((n, _COMPONENTS))
+        self.times, self.seen_at = np.zeros((n, _COMPONENTS)), np.zeros((n, _COMPONENTS))
         self.seconds = 0.0
         self._back = np.zeros(n, np.bool_)
         self._least = np.full(n, _WEIGHT)
@@ -354,7 +367,16 @@ class Background:
         # At first little has been seen: only what was there most of the time counts.
         young = max(0.0, 1.0 - self.seconds / self._settings.learn_s)
         seldom = min(_FAINT, 0.5 / max(self._scans, 1)) if young else _FAINT
-        _faint(self.centre, self.weight, _WEIGHT + 0.34 * young, seldom, self._step, self._least)
+        _faint(
+            self.centre,
+            self.weight,
+            self.empty,
+            self.times,
+            _WEIGHT + 0.34 * young,
+            seldom,
+            self._step,
+            self._least,
+        )
         _classify(
             ranges,
             self.centre,
@@ -400,6 +422,9 @@ class Background:
             self.beyond,
             self.beyond_at,
             self.missing,
+            self.seconds,
+            self.times,
+            self.seen_at,
         )
 
     def adopt(self, beams: NDArray[np.int64], ranges: Array, share: float = 0.3) -> None:
@@ -417,7 +442,7 @@ class Background:
 
     # --- across restarts
 
-    _ARRAYS = ("centre", "sigma", "weight", "empty", "beyond", "beyond_at", "missing")
+    _ARRAYS = ("centre", "sigma", "weight", "empty", "beyond", "beyond_at", "missing", "times", "seen_at")
 
     def save(self) -> tuple[dict[str, Array], dict[str, float]]:
         """Arrays and numbers to keep."""

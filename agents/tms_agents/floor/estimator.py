@@ -50,8 +50,8 @@ _EDGE_M = 0.12
 _MUTE_S, _DARK_M = 1.0, 0.3
 #: So often (s) it is looked how far the lasers see, where no gates are told.
 _LOOKS_S = 2.0
-#: Of saved states; 15: where people came in, where no gates are told.
-_FORMAT = 15
+#: Of saved states; 16: how often each part of a background was seen.
+_FORMAT = 16
 
 
 class FloorEstimator:
