@@ -25,7 +25,7 @@ _FAINT, _WALL_M, _SLANT_M, _GAP = 0.002, 0.8, 0.1, 3
 #: So is what comes back mostly, in this share of the echoes, so many times, each so long (s) after the one before.
 _MOST, _AGAIN, _LATER_S = 0.5, 3, 1.0
 #: What is silent less often than this is missed where nothing comes back.
-_SILENT = 0.3
+_SILENT = 0.7
 #: A surface whose place has been looked past for so long (s) has gone.
 _GONE_S = 5.0
 #: The ranges of one surface differ so little from beam to beam (m).
