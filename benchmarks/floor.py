@@ -2,15 +2,16 @@
 
     python benchmarks/floor.py                     all tables (half an hour on one core)
     python benchmarks/floor.py --quick             the same with two seeds of each kind and a short hour
-    python benchmarks/floor.py --only movers       or objects, plain, static, samples, speed, memory
+    python benchmarks/floor.py --only movers       or objects, plain, faint, static, samples, speed, memory
     python benchmarks/floor.py --seeds unseen      or tuning; both by default
     python benchmarks/floor.py --first 1070        other unseen seeds: five from there on, or --count of them
     python benchmarks/floor.py --untold            nothing of the room is told: neither doors, seats nor sizes of robots
     python benchmarks/floor.py --look "three" --seed 3 --feet prints     one world in numbers
 
 Worlds of `tms_agents.simulation.floor_world`, raw scans of 1081 beams at 10 Hz; `plain`: of 683 beams that reach 5.6 m
-and do not tell how brightly they echo, which is what the shared samples are. Seeds below 1000 were there to tune on,
-those from 1000 on were not. Stone Soup, which is compared for speed, is no dependency: `pip install stonesoup`.
+and do not tell how brightly they echo; `faint`: the same where echoes fade from 3 m on, as they do in the shared
+samples. Seeds below 1000 were there to tune on, those from 1000 on were not. Stone Soup, which is compared for speed,
+is no dependency: `pip install stonesoup`.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class Job:
     seed: int
     contestant: str
     duration: float | None = None
-    plain: bool = False
+    laser: str = "fine"
     told: bool = True
 
 
@@ -74,7 +75,9 @@ class Outcome:
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer seeds")
-    parser.add_argument("--only", choices=("movers", "objects", "plain", "static", "samples", "speed", "memory"))
+    parser.add_argument(
+        "--only", choices=("movers", "objects", "plain", "faint", "static", "samples", "speed", "memory")
+    )
     parser.add_argument("--seeds", choices=("tuning", "unseen", "both"), default="both")
     parser.add_argument("--first", type=int, default=UNSEEN, help="first of the unseen seeds")
     parser.add_argument("--count", type=int, default=5, help="how many unseen seeds")
@@ -106,7 +109,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             worlds(pool, scenes, seeds, names, told=not args.untold)
         if args.only in (None, "plain"):
             print("# A coarse laser without brightness\n")
-            worlds(pool, PLAIN_SCENES, seeds, names, plain=True, told=not args.untold)
+            worlds(pool, PLAIN_SCENES, seeds, names, laser="coarse", told=not args.untold)
+        if args.only in (None, "faint"):
+            print("# The same, but its echoes fade\n")
+            worlds(pool, PLAIN_SCENES, seeds, names, laser="faint", told=not args.untold)
         if args.only in (None, "static"):
             hours = args.hours or (0.2 if args.quick else 1.0)
             static(pool, seeds, names, 3600 * hours, told=not args.untold)
@@ -127,15 +133,15 @@ def worlds(
     seeds: dict[str, range],
     names: Sequence[str],
     *,
-    plain: bool = False,
+    laser: str = "fine",
     told: bool = True,
 ) -> None:
-    """Every scene with every kind of feet; ``plain``: seen by a coarse laser that tells no brightness.
+    """Every scene with every kind of feet, seen by one of `LASERS`: the coarse ones tell no brightness.
 
     ``told``: the contestants know the plan of the room.
     """
     jobs = [
-        Job(scene, feet, seed, name, plain=plain, told=told)
+        Job(scene, feet, seed, name, laser=laser, told=told)
         for scene in scenes
         for feet in FEET
         for kind in seeds.values()
@@ -145,13 +151,13 @@ def worlds(
     done = dict(zip(jobs, pool.map(judged, jobs), strict=True))
 
     def of(scene: str, feet: str, kind: str, name: str) -> list[Scores]:
-        return [done[Job(scene, _feet(feet), seed, name, plain=plain, told=told)].scores for seed in seeds[kind]]
+        return [done[Job(scene, _feet(feet), seed, name, laser=laser, told=told)].scores for seed in seeds[kind]]
 
     for kind, numbers in seeds.items():
         print(f"## Seeds {numbers[0]} to {numbers[-1]} ({kind}); mean and standard deviation over the seeds\n")
-        if moving := [scene for scene in scenes if plain or scene in MOVER_SCENES]:
+        if moving := [scene for scene in scenes if laser != "fine" or scene in MOVER_SCENES]:
             print(movers_table({(s, f, n): of(s, f, kind, n) for s in moving for f in FEET for n in names}), end="\n\n")
-        if lying := [scene for scene in scenes if plain or scene in OBJECT_SCENES]:
+        if lying := [scene for scene in scenes if laser != "fine" or scene in OBJECT_SCENES]:
             print(objects_table({(s, f, n): of(s, f, kind, n) for s in lying for f in FEET for n in names}), end="\n\n")
     if "ours" in names:
         ours: dict[tuple[str, str, str], list[Scores]] = {
@@ -162,11 +168,10 @@ def worlds(
 
 def judged(job: Job) -> Outcome:
     """Play one world to one contestant."""
-    laser = LASERS["coarse" if job.plain else "fine"]
-    world = FloorWorld(job.scene, job.seed, feet=job.feet, laser=laser, duration=job.duration)
+    world = FloorWorld(job.scene, job.seed, feet=job.feet, laser=LASERS[job.laser], duration=job.duration)
     sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
     contestant = CONTESTANTS[job.contestant](sensors, world.known() if job.told else None)
-    scans = ((f.sensor, f.t, f.ranges, None if job.plain else f.intensities) for f in world.scans())
+    scans = ((f.sensor, f.t, f.ranges, f.intensities if job.laser == "fine" else None) for f in world.scans())
     prediction, late_events = told(contestant, scans)
     late = {one["id"] for frame in prediction if frame["t"] > 30 for one in frame["labels"]}
     return Outcome(score(world.truth(), prediction), late_events, len(late))

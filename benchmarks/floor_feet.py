@@ -119,7 +119,7 @@ def choices(job: tuple[str, int, Any, str], duration: float | None = None) -> li
         inside = [mover for mover in world.life.movers.values() if plan.contains(mover.xy, -0.01)]
         told[0].people = {world.room.owner(mover.id): mover.xy for mover in inside if mover.walker is not None}
         told[0].owners = frame.owners
-        ours.scan(frame.sensor, frame.t, frame.ranges, None if laser == "coarse" else frame.intensities)
+        ours.scan(frame.sensor, frame.t, frame.ranges, frame.intensities if laser == "fine" else None)
     return told[0].choices
 
 

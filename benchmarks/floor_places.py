@@ -75,7 +75,7 @@ def watched(job: tuple[str, int, str]) -> list[tuple[Any, ...]]:
     ours = Ours(sensors, world.known())
     scans, poses = [], []
     for frame in world.scans():
-        ours.scan(frame.sensor, frame.t, frame.ranges, None if laser == "coarse" else frame.intensities)
+        ours.scan(frame.sensor, frame.t, frame.ranges, frame.intensities if laser == "fine" else None)
         bodies = ours.estimator._tracks.bodies
         there = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == 0) & (bodies["robot"] == 0)
         scans.append(frame.t)

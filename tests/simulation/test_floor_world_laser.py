@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tms_agents.simulation.floor_world.lasers import COARSE, FINE, Laser, NoiseParameters, misplaced
+from tms_agents.simulation.floor_world.lasers import COARSE, FAINT, FINE, Laser, NoiseParameters, misplaced
 from tms_agents.simulation.floor_world.noise import LaserErrors
 from tms_agents.simulation.floor_world.raycaster import Cast, cast
 from tms_agents.simulation.floor_world.shapes import BLACK, MIRROR, NOBODY, Drawing, Material
@@ -153,6 +153,21 @@ def test_black_things_nearly_never_echo_and_nothing_echoes_beyond_reach() -> Non
     assert np.isfinite(measured(still(2.0, echo=BLACK.echo), **CLEAN)).mean() == pytest.approx(BLACK.echo, abs=0.01)
     assert np.isinf(measured(still(6.0), laser=COARSE, **CLEAN)).all()
     assert np.isnan(measured(still(0.001), **CLEAN)).any()
+
+
+@pytest.mark.parametrize(
+    ("range_m", "low", "high"), [(2.5, 0.97, 1.0), (3.7, 0.7, 0.9), (4.2, 0.4, 0.6), (5.2, 0.0, 0.1)]
+)
+def test_echoes_of_a_faint_laser_are_lost_at_a_distance_as_in_the_shared_samples(
+    range_m: float, low: float, high: float
+) -> None:
+    """Of robots, which are as bright; black things are lost nearer."""
+    seen = still(range_m)
+    assert np.isfinite(measured(seen, laser=COARSE, **CLEAN)).all()
+    share = np.isfinite(measured(seen, laser=FAINT, **CLEAN)).mean()
+    assert low <= share <= high
+    seen.reflectivity[:] = 0.15
+    assert np.isfinite(measured(seen, laser=FAINT, **CLEAN)).mean() < min(share, 0.6)
 
 
 def test_ranges_drift_by_millimetres_in_minutes() -> None:

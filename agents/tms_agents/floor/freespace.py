@@ -296,7 +296,10 @@ def silent(
 def blank(
     x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
 ) -> bool:
-    """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly (``steady``, (n,) m)."""
+    """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly.
+
+    ``steady`` (n,) m: the background where it is hardly ever silent; inf elsewhere.
+    """
     _, low, high = _towards(x, y, half, pose, first, step, ranges.size)
     for i in range(low, high + 1):
         if not np.isinf(ranges[i]) or np.isfinite(steady[i]):

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.build import SHOD, SHOES
-from tms_agents.floor.freespace import FREE, UNSEEN, WALLED, blank, clear, silent
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, blank, clear, silent
 from tms_agents.floor.norm import norm
 from tms_agents.floor.shine import STRANGE, strangeness
 
@@ -141,7 +141,7 @@ def follow(
             q = prints[j]
             q.used, q.first, q.rested, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, t, 0, 0, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
-            q.last, q.silent = t, -1e9
+            q.last, q.silent, q.hidden = t, -1e9, -1e9
             q.still_x, q.still_y, q.still = c.x, c.y, t
             q.attached = c.attached
             q.owner, q.whose, q.owned, q.busy, q.revealed, q.given = -1, -1, -1e9, -1e9, 0, 0
@@ -202,7 +202,9 @@ def follow(
             faint = view == UNSEEN and blank(q.x, q.y, 0.5 * q.width, ranges, steady, pose, first, step)
             if (sensor == q.sensor and (view == FREE or faint)) or passed:
                 q.looks += 1
-            if view == FREE and t - max(q.last, q.silent) > _GONE_S:
+            if view == HIDDEN:
+                q.hidden = t
+            elif view == FREE and t - max(q.last, q.silent) > _GONE_S:
                 q.used = 0
 
 

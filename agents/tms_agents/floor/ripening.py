@@ -47,9 +47,9 @@ _JOINED_S = 3.0
 #: A part of something is joined to it in this share of the scans; what somebody brought who stayed for so long (s), and
 #: lies close to something, in less than that; where nothing has gone from the room it is so in nearly all of them.
 _JOINED, _STAYS_S, _CLOSE, _FUSED = 0.5, 1.0, 0.75, 0.9
-#: What is hidden for so long (s) was in view for so long (s), in such a share of its sightings whole, while everybody
-#: near it showed both feet elsewhere for so long (s).
-_HIDDEN_S, _SEEN_S, _SEEN, _SHOWN_S = 0.5, 1.0, 0.3, 0.4
+#: What is hidden for so long (s), and was just now (s), was in view for so long (s), in such a share of its sightings
+#: whole, while everybody near it showed both feet elsewhere for so long (s).
+_HIDDEN_S, _NOW_S, _SEEN_S, _SEEN, _SHOWN_S = 0.5, 0.3, 1.0, 0.3, 0.4
 
 
 @njit(cache=True)
@@ -89,7 +89,7 @@ def find_ripe(
             continue
         joined = _FUSED if intact else _CLOSE if _brought(q) else _JOINED
         if q.attached > joined and q.given == 0:
-            if leans:
+            if leans and q.last == t:
                 ripe[j] = FURNITURE
                 count += 1
             continue
@@ -136,7 +136,8 @@ def joins(prints: Any, bodies: Any, t: float) -> bool:
 def _was_shown(q: Any, t: float) -> bool:
     """Whether the print, hidden now, was in view long enough, and nobody's foot."""
     seen = q.last - q.rested > _SEEN_S and q.whole >= _SEEN * q.hits
-    return bool(seen and q.spare >= _SHOWN_S and t - q.last > _HIDDEN_S)
+    hidden = t - q.last > _HIDDEN_S and t - q.hidden < _NOW_S
+    return bool(seen and q.spare >= _SHOWN_S and hidden)
 
 
 @njit(cache=True)

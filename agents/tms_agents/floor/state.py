@@ -15,7 +15,8 @@ import numpy as np
 #: background), owner (index of the body whose foot it is, -1: nobody's), whose (label of the last one, until owned),
 #: busy (when a body was last near),
 #: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
-#: alone (s for which it was all that was seen of its owner),
+#: alone (s for which it was all that was seen of its owner), silent and hidden (when nothing at all came back from
+#: there, though something should, and when something new stood before it),
 #: revealed (`furniture.LOOKS`, `furniture.MOVED`), how bright it is (`shine.measure`) and of how many sightings,
 #: beams of the last sighting.
 PRINT = np.dtype(
@@ -47,6 +48,7 @@ PRINT = np.dtype(
         ("idle", "f8"),
         ("alone", "f8"),
         ("silent", "f8"),
+        ("hidden", "f8"),
         ("still_x", "f8"),
         ("still_y", "f8"),
         ("still", "f8"),

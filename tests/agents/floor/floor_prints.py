@@ -15,7 +15,7 @@ def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
     hits = round(10 * seconds) + 1
     values = {"used": 1, "first": NOW - seconds, "rested": NOW - seconds, "last": NOW, "width": width, "owner": -1}
     values |= {"hits": hits, "looks": hits, "whole": hits, "beams": 8, "spacing": 0.01, "whose": -1}
-    values |= {"owned": -1e9, "busy": -1e9, "silent": -1e9}
+    values |= {"owned": -1e9, "busy": -1e9, "silent": -1e9, "hidden": -1e9}
     for name, value in (values | fields).items():
         prints[name] = value
     return prints

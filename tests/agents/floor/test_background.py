@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,7 @@ def learn(background: Background, ranges: np.ndarray, seconds: float, noise: flo
 
 @pytest.fixture
 def learned() -> Background:
-    background = Background(30, FloorSettings())
+    background = Background(30, math.radians(0.5), FloorSettings())
     learn(background, np.full(30, 3.0), 8.0)
     return background
 
@@ -34,7 +36,7 @@ def test_what_is_nearer_is_foreground_and_what_is_farther_is_not(learned: Backgr
 
 
 def test_who_passes_while_it_is_learned_is_not_background() -> None:
-    background = Background(30, FloorSettings())
+    background = Background(30, math.radians(0.5), FloorSettings())
     rng = np.random.default_rng(1)
     for k in range(80):
         scan = np.full(30, 3.0) + rng.normal(0.0, 0.004, 30)
@@ -47,7 +49,7 @@ def test_who_passes_while_it_is_learned_is_not_background() -> None:
 
 
 def test_where_nothing_echoes_anything_is_foreground() -> None:
-    background = Background(30, FloorSettings())
+    background = Background(30, math.radians(0.5), FloorSettings())
     learn(background, np.full(30, np.inf), 8.0)
     assert background.classify(np.full(30, 2.0))[7] == FOREGROUND
 
@@ -86,7 +88,7 @@ def test_what_has_gone_comes_back_whole_and_anything_less_is_something_new() -> 
     """A cupboard, ten beams wide, was moved away a while ago; a small thing lies where its front was."""
     cupboard = np.full(30, 4.0)
     cupboard[10:20] = 3.0
-    background = Background(30, FloorSettings())
+    background = Background(30, math.radians(0.5), FloorSettings())
     learn(background, cupboard, 8.0)
     learn(background, np.full(30, 4.0), 8.0)
     assert (background.classify(cupboard) == BACKGROUND).all()

@@ -78,12 +78,19 @@ def test_something_is_joined_to_the_room_where_somebody_may_have_put_it(
         ({"rested": NOW - 1.7}, False),  # not for a second
         ({"last": NOW - 0.3}, False),  # it may have been a foot that is lifted
         ({"busy": NOW}, False),  # he is still there
+        ({"hidden": NOW - 0.6}, False),  # nothing hides it: it may have been taken
     ],
 )
 def test_what_lay_there_beside_two_feet_is_told_though_it_is_hidden_when_he_has_gone(
     fields: dict[str, float], known: bool
 ) -> None:
-    assert told(resting(4.0, **({"last": NOW - 1.0, "spare": 0.5, "busy": NOW - 2.5} | fields))) == known
+    assert told(resting(4.0, **({"last": NOW - 1.0, "hidden": NOW, "spare": 0.5, "busy": NOW - 2.5} | fields))) == known
+
+
+def test_what_is_hidden_is_not_learned_as_a_part_of_the_wall_until_it_is_seen_again() -> None:
+    before = {"attached": 0.95, "spare": 0.5, "busy": NOW - 8.0}
+    assert not told(resting(12.0, last=NOW - 1.0, hidden=NOW, **before), FURNITURE)
+    assert told(resting(12.0, **before), FURNITURE)
 
 
 def test_a_thing_that_is_told_while_it_is_hidden_was_seen_before() -> None:

@@ -58,7 +58,9 @@ class LaserErrors:
         ranges = np.round(ranges / p.quantum_m) * p.quantum_m
         chance = rng.random((3, n))
         self._silent = self._intermittent & (chance[0] < np.where(self._silent, p.silent_again, p.silent_next))
-        none = self._silent | (chance[1] < p.isolated) | (chance[2] > seen.echo * self._strength(near, seen.reflectivity))
+        none = (
+            self._silent | (chance[1] < p.isolated) | (chance[2] > seen.echo * self._strength(near, seen.reflectivity))
+        )
         none |= (ranges > self._laser.range_max_m) | ~np.isfinite(ranges)
         ranges[none] = np.inf
         ranges[ranges < self._laser.range_min_m] = np.nan
