@@ -23,7 +23,7 @@ _WEIGHT = 0.06
 #: long (m), differs so little from beam to beam (m), and at most so many beams between bring nothing.
 _FAINT, _WALL_M, _SLANT_M, _GAP = 0.002, 0.8, 0.1, 3
 #: So is what comes back mostly, in this share of the echoes, so many times, each so long (s) after the one before.
-_MOST, _AGAIN, _LATER_S = 0.5, 3, 1.0
+_MOST, _AGAIN, _LATER_S = 0.5, 5, 2.0
 #: What is silent less often than this is missed where nothing comes back.
 _SILENT = 0.7
 #: A surface whose place has been looked past for so long (s) has gone.

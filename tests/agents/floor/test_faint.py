@@ -50,8 +50,8 @@ def test_what_comes_back_again_and_again_where_nothing_else_does_belongs_to_the_
     background = learned(np.full(BEAMS, np.inf), 1.0, 8.0)
     scan = np.full(BEAMS, np.inf)
     scan[30] = 4.0
-    for k in range(101):
-        now = scan if k % 20 == 0 else np.full(BEAMS, np.inf)
+    for k in range(181):
+        now = scan if k % 30 == 0 else np.full(BEAMS, np.inf)
         background.classify(now)
         background.learn(now, NOBODY, 0.1)
     assert background.classify(scan)[30] == BACKGROUND
