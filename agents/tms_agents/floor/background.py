@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.faint import FAINT, LATER_S, believe
+from tms_agents.floor.returning import GONE_S, whole
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]
@@ -19,61 +21,18 @@ _COMPONENTS = 4
 _SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 #: A settled component weighs so much; what intermittent beams show less often is not believed.
 _WEIGHT = 0.06
-#: What is faint, because it is dark or far, echoes less often; it is believed if it weighs so much and goes on for so
-#: long (m), differs so little from beam to beam (m), and at most so many beams between bring nothing.
-_FAINT, _WALL_M, _SLANT_M, _GAP = 0.002, 0.8, 0.1, 3
-#: So is what comes back mostly, in this share of the echoes, so many times, each so long (s) after the one before.
-_MOST, _AGAIN, _LATER_S = 0.5, 5, 2.0
 #: What is silent less often than this is missed where nothing comes back.
 _SILENT = 0.7
-#: A surface whose place has been looked past for so long (s) has gone.
-_GONE_S = 5.0
-#: The ranges of one surface differ so little from beam to beam (m).
-_SURFACE_M = 0.05
 
 
 @njit(cache=True)
 def longest_of(centre: Array, weight: Array, least: Array, i: int) -> float:
-    """The farthest component of beam i that is believed, m; 0 if there is none; ``least`` (n,) as `_faint` finds it."""
+    """The farthest component of beam i that is believed, m; 0 if there is none."""
     far = 0.0
     for j in range(centre.shape[1]):
         if weight[i, j] > least[i] and centre[i, j] > far:
             far = centre[i, j]
     return far
-
-
-@njit(cache=True)
-def _faint(
-    centre: Array, weight: Array, empty: Array, times: Array, usual: float, seldom: float, step: float, least: Array
-) -> None:
-    """Fill ``least`` (n,): what components must weigh to be believed, ``usual`` or what the heaviest has, if it is
-    more than ``seldom`` and a part of a long surface, or most of what ever comes back, again and again.
-
-    centre, weight, times: (n, k) components, m; empty: (n,) weight of no echo; step: rad between beams.
-    """
-    n, k = centre.shape
-    a, last, far, long_m = -1, -1, 0.0, 0.0
-    for i in range(n + 1):
-        r, most = 0.0, seldom
-        if i < n:
-            least[i] = usual
-            for j in range(k):
-                if times[i, j] >= _AGAIN and weight[i, j] > _MOST * (1.0 - empty[i]):
-                    least[i] = min(usual, 0.99 * weight[i, j])
-                if weight[i, j] > most:
-                    r, most = centre[i, j], weight[i, j]
-            if r == 0.0 and i - last <= _GAP:
-                continue
-        if a >= 0 and r > 0.0 and abs(r - far) < _SLANT_M * (i - last):
-            long_m += r * step * (i - last)
-        else:
-            if a >= 0 and long_m > _WALL_M:
-                for b in range(a, last + 1):
-                    heaviest = weight[b].max()
-                    if seldom < heaviest <= least[b]:
-                        least[b] = 0.99 * heaviest
-            a, long_m = (i if r > 0.0 else -1), 0.0
-        last, far = i, r
 
 
 @njit(cache=True)
@@ -127,7 +86,7 @@ def _classify(
                     margin = max(threshold, sigmas * sigma[b, j])
                     if abs(r - centre[b, j]) <= margin:
                         state = BACKGROUND
-                        gone &= missing[b, j] > _GONE_S
+                        gone &= missing[b, j] > GONE_S
                     lowest = min(lowest, centre[b, j] - margin)
                     highest = max(highest, centre[b, j] + margin)
         back[i] = state == BACKGROUND and gone
@@ -165,53 +124,9 @@ def _steady(
     """Whether the range r of beam i is near a component of its own that has not gone: so it is mostly."""
     for j in range(centre.shape[1]):
         near = abs(r - centre[i, j]) <= max(threshold, sigmas * sigma[i, j])
-        if weight[i, j] > least[i] and near and not missing[i, j] > _GONE_S:
+        if weight[i, j] > least[i] and near and not missing[i, j] > GONE_S:
             return True
     return False
-
-
-@njit(cache=True)
-def _shown(centre: Array, weight: Array, missing: Array, least: Array, i: int, r: float) -> bool:
-    """Whether something that has gone was at the range r of beam i."""
-    if 0 <= i < centre.shape[0]:
-        for j in range(centre.shape[1]):
-            if weight[i, j] > least[i] and missing[i, j] > _GONE_S and abs(centre[i, j] - r) < _SURFACE_M:
-                return True
-    return False
-
-
-@njit(cache=True)
-def _whole(
-    ranges: Array,
-    centre: Array,
-    weight: Array,
-    missing: Array,
-    least: Array,
-    states: States,
-    back: NDArray[np.bool_],
-) -> None:
-    """What had gone comes back whole: else something new lies where it was, and its ``states`` (n,) are foreground."""
-    n = ranges.size
-    a = 0
-    while a < n:
-        if not back[a]:
-            a += 1
-            continue
-        b = a
-        while b + 1 < n and back[b + 1] and abs(ranges[b + 1] - ranges[b]) < _SURFACE_M:
-            b += 1
-        new = False
-        for edge, side in ((a, -1), (b, 1)):
-            r = ranges[edge]
-            past, beside = True, edge + side
-            for i in (beside, beside + side):
-                # The rest of its surface is still looked past.
-                past = past and _shown(centre, weight, missing, least, i, r) and ranges[i] > r + _SURFACE_M
-            wider = 0 <= beside < n and states[beside] == FOREGROUND and abs(ranges[beside] - r) < _SURFACE_M
-            new = new or past or wider
-        if new:
-            states[a : b + 1] = FOREGROUND
-        a = b + 1
 
 
 @njit(cache=True)
@@ -275,7 +190,7 @@ def _learn(
             if states[i] != FOREGROUND:
                 missing[i, best] = 0.0
             weight[i, best] += rate
-            times[i, best] += seconds - seen_at[i, best] > _LATER_S
+            times[i, best] += seconds - seen_at[i, best] > LATER_S
             gain = max(pull, rate)
             step = r - centre[i, best]
             centre[i, best] += gain * step
@@ -366,8 +281,8 @@ class Background:
         """What each beam shows, (n,); the array is reused."""
         # At first little has been seen: only what was there most of the time counts.
         young = max(0.0, 1.0 - self.seconds / self._settings.learn_s)
-        seldom = min(_FAINT, 0.5 / max(self._scans, 1)) if young else _FAINT
-        _faint(
+        seldom = min(FAINT, 0.5 / max(self._scans, 1)) if young else FAINT
+        believe(
             self.centre,
             self.weight,
             self.empty,
@@ -392,7 +307,7 @@ class Background:
             self.steady,
             self._back,
         )
-        _whole(ranges, self.centre, self.weight, self.missing, self._least, self.states, self._back)
+        whole(ranges, self.centre, self.weight, self.missing, self._least, FOREGROUND, self.states, self._back)
         return self.states
 
     def learn(self, ranges: Array, keep: NDArray[np.bool_], dt: float) -> None:

@@ -9,9 +9,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.build import SHOD, SHOES
-from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, blank, clear, silent
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.norm import norm
 from tms_agents.floor.shine import STRANGE, strangeness
+from tms_agents.floor.silence import blank, silent
 
 Array = NDArray[np.float64]
 

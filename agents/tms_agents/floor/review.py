@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
 from tms_agents.floor.build import SHOES
-from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear, vacant
+from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.lone import count_lone, has_come, has_walked
 from tms_agents.floor.masks import distance
 from tms_agents.floor.norm import norm
 from tms_agents.floor.pair import is_pair
+from tms_agents.floor.silence import vacant
 
 Array = NDArray[np.float64]
 

@@ -16,13 +16,13 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
 from tms_agents.floor.events import Back, Moved, Stale
-from tms_agents.floor.freespace import vacant
 from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.masks import Area, Masks, joined
 from tms_agents.floor.missing import missed
 from tms_agents.floor.nobodys import costs
 from tms_agents.floor.review import CONFIRM, NOTHING, THING, review
 from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
+from tms_agents.floor.silence import vacant
 from tms_agents.floor.state import BODY, PRINT, empty
 from tms_agents.floor.tracks import Tracks
 
