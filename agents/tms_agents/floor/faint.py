@@ -25,25 +25,28 @@ def believe(
     centre, weight, times: (n, k) components, m; empty: (n,) weight of no echo; step: rad between beams.
     """
     n, k = centre.shape
+    heavy = np.empty(n)
     a, last, far, long_m = -1, -1, 0.0, 0.0
     for i in range(n + 1):
-        r, most = 0.0, seldom
+        r = 0.0
         if i < n:
-            least[i] = usual
-            for j in range(k):
-                if times[i, j] >= _AGAIN and weight[i, j] > _MOST * (1.0 - empty[i]):
-                    least[i] = min(usual, 0.99 * weight[i, j])
-                if weight[i, j] > most:
-                    r, most = centre[i, j], weight[i, j]
-            if r == 0.0 and i - last <= _GAP:
+            best = 0
+            for j in range(1, k):
+                if weight[i, j] > weight[i, best]:
+                    best = j
+            least[i], heavy[i], share = usual, weight[i, best], _MOST * (1.0 - empty[i])
+            if share < heavy[i] < usual and times[i, best] >= _AGAIN:
+                least[i] = 0.99 * heavy[i]
+            if heavy[i] > seldom:
+                r = centre[i, best]
+            elif i - last <= _GAP:
                 continue
         if a >= 0 and r > 0.0 and abs(r - far) < _SLANT_M * (i - last):
             long_m += r * step * (i - last)
         else:
             if a >= 0 and long_m > _WALL_M:
                 for b in range(a, last + 1):
-                    heaviest = weight[b].max()
-                    if seldom < heaviest <= least[b]:
-                        least[b] = 0.99 * heaviest
+                    if seldom < heavy[b] <= least[b]:
+                        least[b] = 0.99 * heavy[b]
             a, long_m = (i if r > 0.0 else -1), 0.0
         last, far = i, r
