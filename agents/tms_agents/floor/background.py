@@ -53,7 +53,7 @@ def _classify(
 ) -> None:
     """Fill ``states`` (n,) and ``longest`` (n,) m, the farthest background of each beam (inf: none).
 
-    ``steady`` (n,) m becomes the same where it is hardly ever silent, ``back`` (n,) which beams show nothing but what
+    ``steady`` (n,) m becomes the same where it is not mostly silent, ``back`` (n,) which beams show nothing but what
     had gone.
 
     centre, sigma, weight: (n, k) components, m; empty: (n,) weight of no echo. A range is background if it is near a

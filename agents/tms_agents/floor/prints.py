@@ -99,7 +99,7 @@ def follow(
 ) -> None:
     """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster.
 
-    ``steady`` (n,) m is the background where it is hardly ever silent (inf: elsewhere), the rest as `clear` takes.
+    ``steady`` (n,) m is the background where it is not mostly silent (inf: elsewhere), the rest as `clear` takes.
     """
     m, p = clusters.size, prints.size
     of[:] = -1

@@ -21,7 +21,7 @@ def silent(
 ) -> bool:
     """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy.
 
-    ``steady`` (n,) m: the background where it is hardly ever silent; inf elsewhere.
+    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
     """
     away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
     count = 0
@@ -37,7 +37,7 @@ def blank(
 ) -> bool:
     """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly.
 
-    ``steady`` (n,) m: the background where it is hardly ever silent; inf elsewhere.
+    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
     """
     _, low, high = _towards(x, y, half, pose, first, step, ranges.size)
     for i in range(low, high + 1):
