@@ -62,6 +62,12 @@ def narrow(c: Any) -> bool:
 
 
 @njit(cache=True)
+def faint(c: Any) -> bool:
+    """Whether the cluster is too narrow for a foot, but may be all that comes back of one so far away."""
+    return bool(c.open and not c.attached and narrow(c) and c.width + 0.5 * c.spacing > 0.6 * _FOOT_M)
+
+
+@njit(cache=True)
 def together(body: Any, clusters: Any, i: int, t: float) -> bool:
     """Whether cluster i is wide enough for both feet of the body, is where they stood, and none is seen beside it.
 

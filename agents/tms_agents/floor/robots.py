@@ -12,6 +12,8 @@ from tms_agents.floor.norm import norm
 
 #: Sure after so many sightings, such a way (m), and with so few people beside it (share of the way).
 _HITS, _WAY_M, _ALONE = 15, 1.0, 0.4
+#: Who has taken so many steps may be a person, and what went with one beside it for so much of the way be pushed.
+_STEPS, _BESIDE = 2, 0.15
 #: A robot's width is told from its beams within this (m).
 _MARGIN_M = 0.06
 #: A foot is seen within this (m) of where it was, if that is so long ago (s) at most.
@@ -31,7 +33,9 @@ def recognize(bodies: Any, least: float, most: float) -> int:
             body.wide = max(body.wide, 0.7)
             body.lone = 0.0
             continue
-        alone = body.pushed < _ALONE and body.from_furniture <= 0 and body.both < 0.1 * body.hits
+        # Far away it fell apart, as if into two feet, but took no steps.
+        rigid = body.both < 0.1 * body.hits or (body.own_pace_n < _STEPS and body.pushed < _BESIDE)
+        alone = body.pushed < _ALONE and body.from_furniture <= 0 and rigid
         if body.wide < 0.6 or body.hits < _HITS or not alone or not least - _MARGIN_M < body.far < most + _MARGIN_M:
             continue
         if norm(body.x - body.x0, body.y - body.y0) > _WAY_M:

@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 #: A cluster in the room frame: (x, y) m of the middle of the thing, (width m) across the beams, (n) beams, (near) its
 #: range, (first, last) beam, (cut) partly hidden behind something nearer, 2: that is new, (attached) its surface goes
 #: on as background: a piece of furniture or wall, (gap) m to the background behind it, (mirror) seen in a mirror (-1:
-#: directly), (ex, ey) the line from one end to the other, a unit vector, and the sine between it and the beams (slant).
+#: directly), (ex, ey) the line from one end to the other, a unit vector, and the sine between it and the beams (slant),
+#: (open) nothing comes back beside it, and nothing is known to be there: there may be more of it.
 #: Of what is dark not every beam comes back: cut `FADES` beside beams that bring nothing.
 FADES = 3
 CLUSTER = np.dtype(
@@ -36,6 +37,7 @@ CLUSTER = np.dtype(
         ("ex", "f8"),
         ("ey", "f8"),
         ("slant", "f8"),
+        ("open", "i8"),
     ]
 )
 #: The middle of a thing lies behind the surface seen by this share of its width (discs 0.39, boxes 0.3 to 0.5).
@@ -166,13 +168,15 @@ def _segment(
             c.attached = 1
         if b < n - 1 and (states[b + 1] == BACKGROUND or claimed[b + 1]) and _goes_on(ranges, longest, b + 1, b, a):
             c.attached = 1
-        c.cut = 0
+        c.cut, c.open = 0, 0
         for side in (a - 1, a - 2, b + 1, b + 2):
             if 0 <= side < n and ranges[side] < c.near - 0.1 and not np.isnan(ranges[side]):
                 c.cut = max(c.cut, 1 if states[side] == BACKGROUND else 2)
         for side in (a - 1, b + 1):
             if 0 <= side < n and not np.isfinite(ranges[side]) and np.isfinite(longest[side]) and not c.cut:
                 c.cut = FADES
+            elif 0 <= side < n and np.isinf(ranges[side]) and not np.isfinite(longest[side]):
+                c.open = 1
         middle = (a + b) // 2
         c.gap = longest[middle] - ranges[middle]
         shift = _DEPTH * min(c.width, 0.5)
