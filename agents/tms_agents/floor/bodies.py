@@ -62,7 +62,7 @@ def narrow(c: Any) -> bool:
 
 
 @njit(cache=True)
-def faint(c: Any) -> bool:
+def scant(c: Any) -> bool:
     """Whether the cluster is too narrow for a foot, but may be all that comes back of one so far away."""
     return bool(c.open and not c.attached and narrow(c) and c.width + 0.5 * c.spacing > 0.6 * _FOOT_M)
 
@@ -148,6 +148,12 @@ def footlike(c: Any) -> float:
 
 
 @njit(cache=True)
+def _tells(c: Any) -> bool:
+    """Whether what is seen tells if it is a foot, and is not what is left of one behind somebody else or far away."""
+    return bool(c.cut != 2 and not scant(c))
+
+
+@njit(cache=True)
 def update(
     body: Any,
     c: Any,
@@ -191,8 +197,7 @@ def update(
     body.seen = t
     body.clear = 0.0
     best = max(footlike(c) if has_c else 0.0, footlike(d) if has_d else 0.0)
-    if (has_c and c.cut != 2) or (has_d and d.cut != 2):
-        # What is left of a foot behind somebody else tells nothing.
+    if (has_c and _tells(c)) or (has_d and _tells(d)):
         body.quality += 0.05 * (best - body.quality)
     both = has_c and has_d
     vx, vy, slow = 0.0, 0.0, np.inf

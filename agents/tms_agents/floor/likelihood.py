@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, faint, narrow, together
+from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, scant, together
 from tms_agents.floor.build import (
     LEGS_KNOWN,
     LONGEST_SHOE_M,
@@ -34,7 +34,7 @@ _ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
 #: Who has sat down gets up with a foot so near (m) one of his.
 _RISES_M = 0.9
 #: Where hardly anything comes back a beam or two so near (m) one of his feet are it.
-_FAINT_M = 0.9
+_SCANT_M = 0.9
 #: Who stands for sure has both feet within this (m), until none was seen for so long (s).
 _HELD_M, _LIFTED_S = 0.33, 0.5
 #: Time for which a new print counts as a fresh step (s).
@@ -219,7 +219,7 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         shape += 3.0
         if c.width > _BROAD_M and body.hits > 15:
             shape += 5.0 * max(0.0, 1.0 - 3.0 * body.wide)
-    elif narrow(c) and not (body.confirmed and faint(c) and _strides(body, c) < _FAINT_M):
+    elif narrow(c) and not (body.confirmed and scant(c) and _strides(body, c) < _SCANT_M):
         shape += 2.0 if c.n == 1 else 6.0
     if c.attached:
         shape += 4.0

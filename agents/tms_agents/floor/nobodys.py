@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.bodies import STAND_M, WIDE_M, faint, narrow
+from tms_agents.floor.bodies import STAND_M, WIDE_M, narrow, scant
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
 from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
 from tms_agents.floor.norm import norm
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all, the
 #: same where hardly anything comes back, somebody new known already, and what has rested there as nobody's, the same
 #: too thin for a foot.
-_NOBODY, _THING, _CLUTTER, _FAINT, _TENTATIVE, _RESTS, _THIN = 11.0, 6.0, 4.0, 7.5, 5.0, 2.0, 0.4
+_NOBODY, _THING, _CLUTTER, _SCANT, _TENTATIVE, _RESTS, _THIN = 11.0, 6.0, 4.0, 7.5, 5.0, 2.0, 0.4
 #: Who has stood for so long (s), and would have stepped so lately (s) off what is still there, rather stands there.
 _STOOD_S, _STEPS_S = 3.0, 2.0
 #: A shoe that was nobody's just before (within s): less than somebody new, who is paid for once.
@@ -77,8 +77,8 @@ def nobodys(
         c = clusters[i]
         cost[i, :] = UNLIKELY
         age = t - prints[of[i]].first if of[i] >= 0 else 0.0
-        if faint(c):
-            cost[i, i] = _FAINT
+        if scant(c):
+            cost[i, i] = _SCANT
         elif narrow(c) or c.attached:
             cost[i, i] = _CLUTTER
         else:

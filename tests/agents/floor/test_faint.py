@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from floor_rooms import cast, sweep, walker
 
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, Background
@@ -98,3 +101,23 @@ def test_nobody_is_told_before_somebody_comes(seed: int) -> None:
     events = [event for scan in world.scans() for event in estimator.scan(scan.sensor, scan.t, scan.ranges)]
     assert not world.truth()["movers"]
     assert not events
+
+
+@pytest.mark.parametrize(("seed", "silent"), [(0, 0.8), (1, 0.85), (2, 0.85), (3, 0.85), (4, 0.9), (5, 0.9)])
+def test_who_stands_where_a_beam_or_two_come_back_is_not_lost(seed: int, silent: float) -> None:
+    """He walks up to 4.3 m and back; there so many of the beams that meet him bring nothing, and all others, too."""
+    laser = Sensor(sweep(beams=683, fan=math.radians(240), reach=5.6), (0.0, 0.0, 0.0))
+    walk = walker([(9.0, 1.5, 1.0), (12.5, 4.2, -0.6), (17.0, 4.2, -0.6), (20.0, 2.0, -1.0)])
+    rng, away = np.random.default_rng(seed), []
+    estimator = FloorEstimator({"A": laser})
+    for k in range(195):
+        t = 0.1 * k
+        legs = walk(t)
+        ranges = cast(laser, legs, ())
+        ranges[rng.random(683) < np.where(ranges > 3.6, silent, 0.0)] = np.inf
+        estimator.scan("A", t, np.round(ranges + rng.normal(0.0, 0.006, 683), 3))
+        if legs and t > 11.0:
+            x, y = np.mean([leg[:2] for leg in legs], axis=0)
+            away += [min((math.hypot(x - one.xy[0], y - one.xy[1]) for one in estimator.labels()), default=9.0)]
+    assert {one.id for one in estimator.labels()} == {1}
+    assert np.mean(np.array(away) < 0.5) > 0.97

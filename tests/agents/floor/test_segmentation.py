@@ -119,3 +119,18 @@ def test_what_stands_behind_the_edge_of_something_is_no_shred_of_it() -> None:
     assert len(found) == 2
     thin = clusters([(2.0, 2.0, 0.05), (2.35, 2.19, 0.008)])
     assert len(thin) == 2
+
+
+@pytest.mark.parametrize(
+    ("around", "behind", "is_open"), [(np.inf, np.inf, True), (np.inf, 4.0, False), (4.0, 4.0, False)]
+)
+def test_there_may_be_more_of_what_shows_where_nothing_ever_comes_back(
+    around: float, behind: float, is_open: bool
+) -> None:
+    """One beam meets something; those beside it bring ``around`` m, and ``behind`` m is what is known there."""
+    n = EMPTY.size
+    ranges, states = np.full(n, around), np.full(n, BACKGROUND, np.int8)
+    ranges[n // 2], states[n // 2] = 3.0, FOREGROUND
+    segment = Segmenter(np.abs(STEP), math.radians(15.0))
+    (cluster,) = segment(ranges, states, np.zeros(n, np.bool_), np.full(n, behind), rays(SENSOR, SENSOR.pose, []))
+    assert bool(cluster["open"]) == is_open
