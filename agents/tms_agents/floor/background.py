@@ -75,7 +75,7 @@ def _classify(
             states[i] = NO_ECHO
             continue
         states[i] = BACKGROUND
-        if _steady(centre, sigma, weight, missing, least, sigmas, threshold, i, r):
+        if _its_own(centre, sigma, weight, missing, least, sigmas, threshold, i, r):
             continue
         state = UNKNOWN
         gone = True
@@ -110,7 +110,7 @@ def _classify(
 
 
 @njit(cache=True)
-def _steady(
+def _its_own(
     centre: Array,
     sigma: Array,
     weight: Array,

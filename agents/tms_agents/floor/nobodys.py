@@ -18,8 +18,8 @@ from tms_agents.floor.segmentation import BRIDGE
 Array = NDArray[np.float64]
 
 #: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all, the
-#: same where hardly anything comes back, somebody new known already, and what has rested there as nobody's, the same
-#: too thin for a foot.
+#: same, new, where hardly anything comes back, somebody new known already, and what has rested there as nobody's, the
+#: same too thin for a foot.
 _NOBODY, _THING, _CLUTTER, _SCANT, _TENTATIVE, _RESTS, _THIN = 11.0, 6.0, 4.0, 7.5, 5.0, 2.0, 0.4
 #: Who has stood for so long (s), and would have stepped so lately (s) off what is still there, rather stands there.
 _STOOD_S, _STEPS_S = 3.0, 2.0
@@ -77,7 +77,7 @@ def nobodys(
         c = clusters[i]
         cost[i, :] = UNLIKELY
         age = t - prints[of[i]].first if of[i] >= 0 else 0.0
-        if scant(c):
+        if scant(c) and age < FRESH_S:
             cost[i, i] = _SCANT
         elif narrow(c) or c.attached:
             cost[i, i] = _CLUTTER
