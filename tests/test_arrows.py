@@ -21,7 +21,7 @@ ALLOWED: dict[str, set[str]] = {
         *("tms_schemas", "tms_client", "pydantic", "pydantic_settings", "httpx"),
         *("numpy", "numba", "scipy", "PIL", "serial", "pymodbus", "rosbags"),
     },
-    "tms_agents/slam": {"tms_agents/slam", "numpy", "numba", "scipy", "PIL"},
+    "tms_agents/slam": {"tms_agents/slam", "tms_agents/compiled", "numpy", "numba", "scipy", "PIL"},
     "tms_server": {
         *("tms_schemas", "tms_migrations", "pydantic", "pydantic_settings", "pydantic_core", "fastapi", "starlette"),
         *("sqlalchemy", "alembic", "uvicorn", "numpy", "numba", "PIL", "biip", "epcpy", "fastapi_offline", "asyncpg"),

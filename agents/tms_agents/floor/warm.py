@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tms_agents.compiled import sources
 from tms_agents.devices.scans import Sweep
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
 from tms_agents.floor.dark import dark_width
@@ -25,9 +26,10 @@ def compiled_before() -> bool:
 
 
 def _kept(kernel: Any) -> bool:
-    source = Path(inspect.getfile(kernel.py_func))
+    source = Path(inspect.getfile(kernel.py_func)).resolve()
     files = Path(kernel.stats.cache_path).glob(f"{source.stem}.{kernel.py_func.__name__}-*.nbi")
-    return any(one.stat().st_mtime >= source.stat().st_mtime for one in files)
+    changed = max(one.stat().st_mtime for one in sources(source))
+    return any(one.stat().st_mtime >= changed for one in files)
 
 
 def warm_up() -> None:

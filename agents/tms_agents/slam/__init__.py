@@ -1,6 +1,7 @@
 """Laser mapping: a particle filter over maps that share tiles, and loop closing behind it; localisation in a known
 map. No I/O to any server."""
 
+import tms_agents.compiled  # noqa: F401, before there are kernels
 from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.known import MapError, known_map
 from tms_agents.slam.localisation import Localiser

@@ -14,6 +14,7 @@ it stands. A seed gives the same room and, until somebody steps on another foot,
 given. Nothing in here imports an estimator.
 """
 
+import tms_agents.compiled  # noqa: F401, before there are kernels
 from tms_agents.simulation.floor_world.furnishing import Home, Setting, furnish
 from tms_agents.simulation.floor_world.lasers import COARSE, FINE, LASERS, Laser, Mount, NoiseParameters
 from tms_agents.simulation.floor_world.room import Furniture, LiveRoom, Robot, Thing, Wall

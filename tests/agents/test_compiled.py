@@ -1,0 +1,96 @@
+"""A kernel is compiled anew when what it calls has changed, and only then."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tms_agents import compiled
+
+_RUN = """
+import town_kernels.compiled
+from town_kernels.caller import answer
+print(answer(1.0), sum(answer.stats.cache_hits.values()))
+"""
+_CALLER = """
+from numba import njit
+from town_kernels.callee import (
+    called,
+)
+
+@njit(cache=True)
+def answer(x):
+    return called() + x
+"""
+_CALLEE = """
+from numba import njit
+from town_kernels.number import NUMBER
+
+@njit(cache=True)
+def called():
+    return NUMBER
+"""
+_BY_PACKAGE = """
+from numba import njit
+from town_kernels import deep
+
+@njit(cache=True)
+def answer(x):
+    return deep.NUMBER + x
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package of three modules, each of which is compiled into the one before; with the locator of ours."""
+    package = tmp_path / "town_kernels"
+    package.mkdir()
+    shutil.copy(compiled.__file__, package / "compiled.py")
+    (package / "__init__.py").touch()
+    (package / "caller.py").write_text(_CALLER)
+    (package / "callee.py").write_text(_CALLEE)
+    (package / "number.py").write_text("NUMBER = 2.0\n")
+    (package / "other.py").write_text("NUMBER = 2.0\n")
+    return package
+
+
+def run(package: Path, **environment: str) -> tuple[float, int]:
+    """What the kernel says in a process of its own, and how many kernels it found on disk."""
+    mine = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    mine |= {"PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    done = subprocess.run([sys.executable, "-c", _RUN], env=mine, capture_output=True, text=True, check=True)
+    said, found = done.stdout.split()
+    return float(said), int(found)
+
+
+@pytest.mark.parametrize("folder", ["", "elsewhere"])
+def test_what_a_kernel_calls_has_changed(package: Path, tmp_path: Path, folder: str) -> None:
+    where = {"NUMBA_CACHE_DIR": str(tmp_path / folder)} if folder else {}
+    assert run(package, **where) == (3.0, 0)
+    assert run(package, **where) == (3.0, 1)
+    (package / "other.py").write_text("NUMBER = 7.0\n")
+    assert run(package, **where) == (3.0, 1)
+    (package / "number.py").write_text("NUMBER = 5.0\n")
+    assert run(package, **where) == (6.0, 0)
+    assert run(package, **where) == (6.0, 1)
+
+
+def test_what_is_imported_is_a_module_or_comes_by_a_package(package: Path) -> None:
+    (package / "deep").mkdir()
+    (package / "deep" / "__init__.py").write_text("from town_kernels.number import NUMBER\n")
+    (package / "caller.py").write_text(_BY_PACKAGE)
+    assert run(package) == (3.0, 0)
+    (package / "number.py").write_text("NUMBER = 5.0\n")
+    assert run(package) == (6.0, 0)
+
+
+def test_who_names_a_locator_has_it(package: Path) -> None:
+    named = {"NUMBA_CACHE_LOCATOR_CLASSES": "InTreeCacheLocator"}
+    assert run(package, **named) == (3.0, 0)
+    (package / "number.py").write_text("NUMBER = 5.0\n")
+    assert run(package, **named) == (3.0, 1)  # as numba does it
