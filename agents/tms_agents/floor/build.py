@@ -95,6 +95,12 @@ def wears_shoes(body: Any) -> bool:
 
 
 @njit(cache=True)
+def knows_feet(body: Any) -> bool:
+    """Whether it is known how wide the legs or how long the shoes are of the one whose name it has."""
+    return bool(body.own_girth_n >= LEGS_KNOWN or wears_shoes(body))
+
+
+@njit(cache=True)
 def from_side(c: Any) -> bool:
     """Whether the cluster, if a shoe, shows its heel and its toes."""
     return bool(c.cut == 0 and _SIDE_M < c.width < _SHOE_M[1])

@@ -50,8 +50,8 @@ _EDGE_M = 0.12
 _MUTE_S, _DARK_M = 1.0, 0.3
 #: So often (s) it is looked how far the lasers see, where no gates are told.
 _LOOKS_S = 2.0
-#: Of saved states; 16: how often each part of a background was seen.
-_FORMAT = 16
+#: Of saved states; 17: for how long who stays is broader than feet.
+_FORMAT = 17
 
 
 class FloorEstimator:
@@ -143,6 +143,8 @@ class FloorEstimator:
         if not view.background.learned:
             clusters = clusters[: backed(clusters)]
         clusters = clusters[: self._footprints.step(view, clusters, t, lambda: self._pieces(t))]
+        if self._tracks.flickering.places:
+            clusters = clusters[: self._tracks.flickering.step(view, clusters, bodies, t)]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]
         follow(clusters, of, prints, view.index, t, view.background.steady, *view.sight)
@@ -280,6 +282,7 @@ class FloorEstimator:
             "shoes": pack(self._shoes),
             "absent": self._tracks.absent.save(),
             "strides": self._tracks.strides,
+            "flickering": self._tracks.flickering.save(),
             "prints": pack(self._prints),
             "things": pack(self._objects.things),
             "visitors": self._objects.visitors.save(self._objects.things),
@@ -323,6 +326,7 @@ class FloorEstimator:
             if "shoes" in state:
                 self._shoes[:] = unpack(state["shoes"], self._shoes)
             self._tracks.absent.restore(state["absent"])
+            self._tracks.flickering.restore(state["flickering"])
             self._tracks.strides = [(float(t), float(x), float(y), float(u)) for t, x, y, u in state.get("strides", ())]
             self._prints[:] = unpack(state["prints"], self._prints)
             self._objects.things[:] = unpack(state["things"], self._objects.things)

@@ -100,3 +100,11 @@ def sizes(robots: Sequence[tuple[float, float]]) -> tuple[float, float]:
     if not robots:
         return 0.3, 0.9
     return min(min(size) for size in robots), max(math.hypot(*size) for size in robots)
+
+
+def may_be_robot(body: Any, robots: Sequence[tuple[float, float]]) -> bool:
+    """Whether who is new, and mostly wide, is as wide as one of the ``robots``, or any, where none is known."""
+    least, most = sizes(robots)
+    if robots:
+        return bool(0.7 * least < body["far"] < 1.2 * most and body["wide"] > 0.3)
+    return bool(body["wide"] > 0.5)

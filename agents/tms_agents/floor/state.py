@@ -69,11 +69,13 @@ CONCEALED, SEATED = 1, 2
 #: who it is (look, pace, girth, sole), and of the one whose name it has (own, own_pace, own_girth, own_sole); sure is
 #: how likely that name is. Further: the number of its `FOOTPRINT` (0: none), for how long (s) and where it has stood on
 #: one foot alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it
-#: has stayed (rest), how wide the legs are (m, 0: unknown), whether what is seen of it is no foot, and why (odd,
-#: `prints.UNLIKE`), the line on which the shoe last seen from its side lay (ex, ey), and when (e_at), in how many scans
-#: both feet had been seen (both) when it was last found to be nowhere (doubted), until when it stays where it was put
-#: back (held, s), and when somebody began to be seen, far from every door, who may be who it was (suspected). Of one
-#: not believed yet: in how many scans it was seen (hits), could have been (looks), and was or should have been (due).
+#: has stayed (rest), where, more widely, and for how long it was seen there (stay, s), broader than feet (stay_broad,
+#: s), how broad (m) the broader of what was seen of it last is (broadest), how wide the legs are (m, 0: unknown),
+#: whether what is seen of it is no foot, and why (odd, `prints.UNLIKE`), the line on which the shoe last seen from its
+#: side lay (ex, ey), and when (e_at), in how many scans both feet had been seen (both) when it was last found to be
+#: nowhere (doubted), until when it stays where it was put back (held, s), and when somebody began to be seen, far from
+#: every door, who may be who it was (suspected). Of one not believed yet: in how many scans it was seen (hits), could
+#: have been (looks), and was or should have been (due).
 BODY = np.dtype(
     [
         ("used", "i8"),
@@ -131,6 +133,11 @@ BODY = np.dtype(
         ("rest_x", "f8"),
         ("rest_y", "f8"),
         ("rest_at", "f8"),
+        ("stay_x", "f8"),
+        ("stay_y", "f8"),
+        ("stay", "f8"),
+        ("stay_broad", "f8"),
+        ("broadest", "f8"),
         ("pushed", "f8"),
         ("quality", "f8"),
         ("single", "f8"),

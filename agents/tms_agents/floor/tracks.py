@@ -12,6 +12,7 @@ from tms_agents.floor.absent import Absent
 from tms_agents.floor.association import OWN, Association
 from tms_agents.floor.bodies import stuck
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.flickering import Flickering
 from tms_agents.floor.lone import has_walked
 from tms_agents.floor.pair import is_pair
 from tms_agents.floor.place import place, tell
@@ -19,6 +20,7 @@ from tms_agents.floor.review import (
     BACK,
     BROAD,
     CONFIRM,
+    FLICKERS,
     GONE,
     LEG_M,
     LOST,
@@ -33,6 +35,7 @@ from tms_agents.floor.review import (
     review,
     unseen,
 )
+from tms_agents.floor.robots import may_be_robot
 from tms_agents.floor.settings import FloorSettings, Scene
 from tms_agents.floor.state import CONCEALED, SEATED
 from tms_agents.floor.twice import began, landed, suspect
@@ -77,8 +80,9 @@ class Tracks:
         self._settings = settings
         self._where = Whereabouts(scene)
         self._region = self._where.region
-        self._robots = [tuple(sorted(size)) for size in scene.robots]
+        self._robots = scene.robots
         self.absent = Absent(self._where.gates, self._region)
+        self.flickering = Flickering()
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
@@ -125,7 +129,9 @@ class Tracks:
             if action == NOTHING:
                 continue
             body = self.bodies[index]
-            if action == THING or (action == PIECE and is_furniture(body)):
+            if action == FLICKERS:
+                self.flickering.found(body, t)
+            if action in (THING, FLICKERS) or (action == PIECE and is_furniture(body)):
                 # Somebody who is known for long has gone on from there.
                 events += self._lost(index, t, thing=True) if is_somebody(body) else self._gone(index, t)
             elif action == GONE:
@@ -285,7 +291,7 @@ class Tracks:
             body["from_furniture"] = 1
             return []
         self._association.decide(index)
-        robot = self._is_robot(body)
+        robot = may_be_robot(body, self._robots)
         if robot and body["from_furniture"] == 0 and body["pushed"] < _ALONE:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
@@ -333,13 +339,6 @@ class Tracks:
         """(label, place, covariance) of the mover, which is told now."""
         label, x, y, variance = tell(self.bodies, index, t)
         return label, (x, y), (variance, 0.0, variance)
-
-    def _is_robot(self, body: Any) -> bool:
-        if self._robots:
-            least = min(size[0] for size in self._robots)
-            most = max(math.hypot(*size) for size in self._robots)
-            return bool(0.7 * least < body["far"] < 1.2 * most and body["wide"] > 0.3)
-        return bool(body["wide"] > 0.5)
 
     def _stands(self, body: Any, new: Any) -> bool:
         """Whether who shows one foot has stood there for long, and the ``new`` one stands, too, or may be another."""

@@ -46,7 +46,7 @@ def at(one: Tracks, t: float) -> list:
 def walker(body: np.ndarray, x: float, y: float, v: tuple[float, float], seen: float) -> None:
     """Somebody believed who was seen last at (x, y) and has gone on at v since."""
     body["used"] = body["confirmed"] = body["label"] = 1
-    body["hits"], body["both"], body["quality"], body["own_pace_n"] = 300, 250, 1.0, 5
+    body["hits"], body["both"], body["quality"], body["own_pace_n"], body["far"] = 300, 250, 1.0, 5, 0.12
     gone = NOW - seen
     body["x"], body["y"], body["vx"], body["vy"] = x + gone * v[0], y + gone * v[1], *v
     body["told_x"], body["told_y"], body["seen"], body["rest_at"] = x, y, seen, seen
