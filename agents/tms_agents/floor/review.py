@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -93,11 +93,12 @@ def _is_put(bodies: Any, b: int, t: float) -> bool:
 
 
 @njit(cache=True)
-def _has_come(body: Any, t: float, ranges: Array, longest: Array, pose: Array, first: float, step: float) -> bool:
+def _has_come(body: Any, t: float, sight: Any) -> bool:
     """Whether it has gone from where it began: of something dark that stands there parts flicker, here and there."""
     a = body.a_seen == t and norm(body.ax - body.x0, body.ay - body.y0) < _STILL_THERE_M
     if a or (body.b_seen == t and norm(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
         return True
+    ranges, _, longest, pose, first, step = sight
     return bool(vacant(body.x0, body.y0, _BEGAN_M, ranges, longest, pose, first, step))
 
 
@@ -189,9 +190,7 @@ def _accompanied(bodies: Any, b: int, t: float) -> bool:
 
 
 @njit(cache=True)
-def _comes_out(
-    body: Any, ranges: Array, states: NDArray[np.int8], longest: Array, pose: Array, first: float, step: float
-) -> bool:
+def _comes_out(body: Any, sight: Any) -> bool:
     """Whether who walks on behind something would be out of reach, or behind a wall, when it hides him no more."""
     dx, dy = body.x - body.told_x, body.y - body.told_y
     far = norm(dx, dy)
@@ -199,10 +198,20 @@ def _comes_out(
         return False
     for i in range(1, _LOOKS + 1):
         ahead = i * _LOOK_M / far
-        view = clear(body.x + ahead * dx, body.y + ahead * dy, 0.15, ranges, states, longest, pose, first, step)
+        view = clear(body.x + ahead * dx, body.y + ahead * dy, 0.15, *sight)
         if view != HIDDEN:
             return bool(view != FREE)
     return False
+
+
+class Waits(NamedTuple):
+    """Of `settings.FloorSettings`, what `review` has to know."""
+
+    confirm_s: float
+    confirm_m: float
+    leave_s: float
+    hidden_s: float
+    stale_s: float
 
 
 @njit(cache=True)
@@ -210,17 +219,8 @@ def review(
     bodies: Any,
     t: float,
     dt: float,
-    ranges: Array,
-    states: NDArray[np.int8],
-    longest: Array,
-    pose: Array,
-    first: float,
-    step: float,
-    confirm_s: float,
-    confirm_m: float,
-    leave_s: float,
-    hidden_s: float,
-    stale_s: float,
+    sight: Any,
+    waits: Waits,
     actions: NDArray[np.int64],
     inside: bool,
     learned: bool,
@@ -228,7 +228,8 @@ def review(
 ) -> None:
     """What is due for each body, into ``actions``; drops tentative ones that came to nothing.
 
-    ``legs``: it is known that people show legs here, not shoes.
+    ``sight`` is what `clear` takes. ``inside``: walls are known. ``learned``: the room is. ``legs``: it is known that
+    people show legs here, not shoes.
     """
     for b in range(bodies.size):
         body = bodies[b]
@@ -244,88 +245,108 @@ def review(
                 body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
             _stays(body, dt, legs)
         if not body.confirmed:
-            way = norm(body.x - body.x0, body.y - body.y0)
-            age = body.seen - body.first
-            furniture = body.from_furniture == 1 or body.pushed > _BESIDE
-            parked = furniture and t - body.rest_at > _PARKED_S
-            stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
-            pair = stays and is_pair(body, t)
-            if unseen > 0.45 or (stays and not pair) or parked or body.hits < 0.5 * body.looks - 1.0:
-                body.used = 0
-                continue
-            if unseen > 0.0:
-                continue
-            if body.footprint:
-                actions[b] = CONFIRM
-                continue
-            beside, halved, part = np.inf, False, False
-            for o in range(bodies.size):
-                if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
-                    away = norm(bodies[o].x - body.x, bodies[o].y - body.y)
-                    # Who begins beside somebody may be he, and what stands there what he has put down.
-                    beside = min(beside, away, norm(bodies[o].x - body.x0, bodies[o].y - body.y0))
-                    # A part of somebody who is wide: legs that are one thing to the laser fall apart now and then.
-                    part = part or away < 0.12 + 0.5 * bodies[o].width
-                    # One foot of somebody there is not seen now: this may be it.
-                    if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
-                        halved = True
-            if part or (pair and (halved or not learned or body.score < _LIKELY * body.hits)):
-                body.used = 0
-                continue
-            if pair:
-                actions[b] = CONFIRM
-                continue
-            needed_s = confirm_s if beside > 0.6 else 3.0 * confirm_s
-            needed_m = confirm_m if beside > 0.6 else 1.5 * confirm_m
-            if halved:
-                needed_s = 8.0 * confirm_s
-            if not learned:
-                needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
-            if body.wide > 0.5:
-                # Furniture that is pushed aside looks like a robot at first.
-                needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
-            steady = body.hits >= max(_HITS, _STEADY * body.due)
-            if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, _LIKELY * body.hits):
-                came = _has_come(body, t, ranges, longest, pose, first, step)
-                actions[b] = CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
-            continue
-        if unseen == 0.0:
-            count_lone(bodies, b, t, dt, (ranges, states, longest, pose, first, step))
-            single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
-            body.single = body.single + dt if single else 0.0
-            if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
-                # One thing that does not move is no person: whoever it was is somewhere else.
-                actions[b] = LOST
-            elif (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or _is_parked(body, t, legs):
-                actions[b] = THING
-            elif _flickers(body, legs):
-                body.stay = body.stay_broad = 0.0
-                actions[b] = FLICKERS
-            elif body.stale:
-                actions[b] = BACK
-            elif int(t) > int(t - dt) and _is_piece(body, t):
-                # Once a second: to look what has gone from the background takes longer than all of this.
-                actions[b] = PIECE
-            elif norm(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
-                new = t - body.first < _NEW_S and body.from_furniture == 0
-                actions[b] = BROAD if new and (body.wide > 0.5 or is_footless(body)) else MOVED
-            continue
-        if unseen > (_BEHIND_S if body.footprint else 0.12):
-            view = clear(body.x, body.y, 0.15, ranges, states, longest, pose, first, step)
-            if view == FREE:
-                body.clear += dt
-            elif view == UNSEEN or (view == WALLED and not inside):
-                # Where no walls are known, who walks on out of sight is soon far.
-                walks = not inside and norm(body.x - body.told_x, body.y - body.told_y) > _REST_M
-                body.clear += dt if walks else 0.5 * dt
-            elif view == HIDDEN and not inside and _comes_out(body, ranges, states, longest, pose, first, step):
-                body.clear += 0.5 * dt
-            elif view == HIDDEN:
-                body.clear = max(0.0, body.clear - 0.5 * dt)
-        if body.clear > leave_s or unseen > hidden_s:
-            actions[b] = GONE
-        elif unseen > stale_s and not body.stale:
-            actions[b] = LOST
+            actions[b] = _new(bodies, b, t, sight, waits, learned)
+        elif unseen == 0.0:
+            actions[b] = _seen(bodies, b, t, dt, sight, legs)
+        else:
+            actions[b] = _not_seen(body, t, dt, sight, waits, inside)
+
+
+@njit(cache=True)
+def _new(bodies: Any, b: int, t: float, sight: Any, waits: Waits, learned: bool) -> int:
+    """What is due for a body that is not believed yet; it is dropped if it came to nothing."""
+    body = bodies[b]
+    unseen = t - body.seen
+    way = norm(body.x - body.x0, body.y - body.y0)
+    age = body.seen - body.first
+    furniture = body.from_furniture == 1 or body.pushed > _BESIDE
+    parked = furniture and t - body.rest_at > _PARKED_S
+    stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
+    pair = stays and is_pair(body, t)
+    if unseen > 0.45 or (stays and not pair) or parked or body.hits < 0.5 * body.looks - 1.0:
+        body.used = 0
+        return NOTHING
+    if unseen > 0.0:
+        return NOTHING
+    if body.footprint:
+        return CONFIRM
+    beside, halved, part = np.inf, False, False
+    for o in range(bodies.size):
+        if o != b and bodies[o].used and bodies[o].confirmed and not bodies[o].stale:
+            away = norm(bodies[o].x - body.x, bodies[o].y - body.y)
+            # Who begins beside somebody may be he, and what stands there what he has put down.
+            beside = min(beside, away, norm(bodies[o].x - body.x0, bodies[o].y - body.y0))
+            # A part of somebody who is wide: legs that are one thing to the laser fall apart now and then.
+            part = part or away < 0.12 + 0.5 * bodies[o].width
+            # One foot of somebody there is not seen now: this may be it.
+            if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
+                halved = True
+    if part or (pair and (halved or not learned or body.score < _LIKELY * body.hits)):
+        body.used = 0
+        return NOTHING
+    if pair:
+        return CONFIRM
+    needed_s = waits.confirm_s if beside > 0.6 else 3.0 * waits.confirm_s
+    needed_m = waits.confirm_m if beside > 0.6 else 1.5 * waits.confirm_m
+    if halved:
+        needed_s = 8.0 * waits.confirm_s
+    if not learned:
+        needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
+    if body.wide > 0.5:
+        # Furniture that is pushed aside looks like a robot at first.
+        needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
+    steady = body.hits >= max(_HITS, _STEADY * body.due)
+    if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, _LIKELY * body.hits):
+        came = _has_come(body, t, sight)
+        return CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
+    return NOTHING
+
+
+@njit(cache=True)
+def _seen(bodies: Any, b: int, t: float, dt: float, sight: Any, legs: bool) -> int:
+    """What is due for a body that is believed, and seen now."""
+    body = bodies[b]
+    count_lone(bodies, b, t, dt, sight)
+    single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
+    body.single = body.single + dt if single else 0.0
+    if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
+        # One thing that does not move is no person: whoever it was is somewhere else.
+        return LOST
+    if (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or _is_parked(body, t, legs):
+        return THING
+    if _flickers(body, legs):
+        body.stay = body.stay_broad = 0.0
+        return FLICKERS
+    if body.stale:
+        return BACK
+    if int(t) > int(t - dt) and _is_piece(body, t):
+        # Once a second: to look what has gone from the background takes longer than all of this.
+        return PIECE
+    if norm(body.x - body.told_x, body.y - body.told_y) > _TELL_M:
+        new = t - body.first < _NEW_S and body.from_furniture == 0
+        return BROAD if new and (body.wide > 0.5 or is_footless(body)) else MOVED
+    return NOTHING
+
+
+@njit(cache=True)
+def _not_seen(body: Any, t: float, dt: float, sight: Any, waits: Waits, inside: bool) -> int:
+    """What is due for a body that is believed, and not seen now."""
+    unseen = t - body.seen
+    if unseen > (_BEHIND_S if body.footprint else 0.12):
+        view = clear(body.x, body.y, 0.15, *sight)
+        if view == FREE:
+            body.clear += dt
+        elif view == UNSEEN or (view == WALLED and not inside):
+            # Where no walls are known, who walks on out of sight is soon far.
+            walks = not inside and norm(body.x - body.told_x, body.y - body.told_y) > _REST_M
+            body.clear += dt if walks else 0.5 * dt
+        elif view == HIDDEN and not inside and _comes_out(body, sight):
+            body.clear += 0.5 * dt
+        elif view == HIDDEN:
+            body.clear = max(0.0, body.clear - 0.5 * dt)
+    if body.clear > waits.leave_s or unseen > waits.hidden_s:
+        return GONE
+    return LOST if unseen > waits.stale_s and not body.stale else NOTHING
 
 
 @njit(cache=True)

@@ -28,6 +28,7 @@ from tms_agents.floor.review import (
     NOTHING,
     PIECE,
     THING,
+    Waits,
     doubled,
     is_footless,
     is_somebody,
@@ -78,6 +79,7 @@ class Tracks:
         self._association = association
         self.bodies = association.bodies
         self._settings = settings
+        self._waits = Waits(*(getattr(settings, name) for name in Waits._fields))
         self._where = Whereabouts(scene)
         self._region = self._where.region
         self._robots = scene.robots
@@ -104,23 +106,8 @@ class Tracks:
         ``was_furniture`` tells of a body whether a piece of background has gone from where it began, ``is_furniture``
         whether one that looks like it has gone. ``legs``: it is known that people show legs here.
         """
-        s = self._settings
         judge: Any = review
-        judge(
-            self.bodies,
-            t,
-            dt,
-            *sight,
-            s.confirm_s,
-            s.confirm_m,
-            s.leave_s,
-            s.hidden_s,
-            s.stale_s,
-            self._actions,
-            bool(self._region.polygons),
-            learned,
-            legs,
-        )
+        judge(self.bodies, t, dt, sight, self._waits, self._actions, bool(self._region.polygons), learned, legs)
         self._see_off(t)
         self._believe_steps(t)
         self._association.rename(t)

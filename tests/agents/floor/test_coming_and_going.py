@@ -20,13 +20,14 @@ from tms_agents.floor.likelihood import UNLIKELY, feet
 from tms_agents.floor.masks import Area, Masks, joined
 from tms_agents.floor.missing import missed
 from tms_agents.floor.nobodys import costs
-from tms_agents.floor.review import CONFIRM, NOTHING, THING, review
+from tms_agents.floor.review import CONFIRM, NOTHING, THING, Waits, review
 from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
 from tms_agents.floor.silence import vacant
 from tms_agents.floor.state import BODY, PRINT, empty
 from tms_agents.floor.tracks import Tracks
 
 NOW = 100.0
+WAITS = Waits(confirm_s=0.35, confirm_m=0.25, leave_s=1.5, hidden_s=60.0, stale_s=1.0)
 ROOM = [(0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0)]
 DOOR = [(4.5, 1.0), (5.5, 1.0), (5.5, 2.0), (4.5, 2.0)]
 #: A laser at the origin that looks along x and sees walls 8 m away.
@@ -203,7 +204,7 @@ def test_what_rests_and_never_showed_two_feet_or_took_a_step_is_a_thing(
     walker(bodies[0], 3.0, 0.0, (0.0, 0.0), NOW)
     bodies["own_pace_n"], bodies["both"], bodies["rest_at"], bodies["rest_x"] = steps, feet, NOW - 31.0, 3.0
     bodies["x0"] = x0
-    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+    review(bodies, NOW, 0.1, OPEN, WAITS, actions, False, True, False)
     assert (actions[0] == THING) == thing
 
 
@@ -329,7 +330,7 @@ def test_who_is_believed_has_gone_from_where_he_began(there: float, believed: bo
     bodies["ax"] = bodies["bx"] = 3.0
     bodies["ay"] = bodies["by"] = 0.5
     ranges, states = scan(dict.fromkeys(range(45, 56), there) if there != 8.0 else {})
-    review(bodies, NOW, 0.1, ranges, states, *OPEN[2:], 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+    review(bodies, NOW, 0.1, (ranges, states, *OPEN[2:]), WAITS, actions, False, True, False)
     assert actions[0] == (CONFIRM if believed else NOTHING)
 
 
@@ -337,7 +338,7 @@ def test_what_is_not_believed_for_long_is_nobody() -> None:
     bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
     bodies["used"], bodies["hits"], bodies["looks"], bodies["score"] = 1, 70, 70, 20.0
     bodies["first"], bodies["seen"], bodies["x"] = NOW - 7.0, NOW, 0.3
-    review(bodies, NOW, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+    review(bodies, NOW, 0.1, OPEN, WAITS, actions, False, True, False)
     assert bodies["used"][0] == 0
 
 

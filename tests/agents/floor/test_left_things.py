@@ -11,11 +11,12 @@ from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND
 from tms_agents.floor.freespace import guard
 from tms_agents.floor.furniture import Furniture
 from tms_agents.floor.prints import follow
-from tms_agents.floor.review import CONFIRM, NOTHING, review
+from tms_agents.floor.review import CONFIRM, NOTHING, Waits, review
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0
+WAITS = Waits(confirm_s=0.35, confirm_m=0.25, leave_s=1.5, hidden_s=60.0, stale_s=1.0)
 #: Something new stands right before a laser of three beams, so that nothing behind it is seen.
 COVERED = (np.full(3, 0.5), np.full(3, FOREGROUND, np.int8), np.full(3, 5.0), np.zeros(3), -0.05, 0.05)
 
@@ -95,5 +96,5 @@ def test_nobody_begins_with_a_foot_that_came_beside_somebody_and_has_never_moved
     if stepped:
         bodies["a_since"] = NOW - 1.0
     actions = np.zeros(2, np.int64)
-    review(bodies, NOW, 0.1, *COVERED, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+    review(bodies, NOW, 0.1, COVERED, WAITS, actions, False, True, False)
     assert actions[1] == action

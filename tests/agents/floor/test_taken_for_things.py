@@ -12,7 +12,7 @@ from tms_agents.floor.bodies import stuck
 from tms_agents.floor.build import SHOD, legs
 from tms_agents.floor.objects import Objects
 from tms_agents.floor.prints import ALONE, UNLIKE, attend, follow, lay_before
-from tms_agents.floor.review import LOST, review
+from tms_agents.floor.review import LOST, Waits, review
 from tms_agents.floor.ripening import OBJECT
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.settings import FloorSettings
@@ -20,6 +20,7 @@ from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
 
 NOW = 100.0
+WAITS = Waits(confirm_s=0.35, confirm_m=0.25, leave_s=1.5, hidden_s=60.0, stale_s=1.0)
 #: All is seen as far as the wall; nothing is seen behind what is new.
 OPEN = (np.full(41, 5.0), np.full(41, BACKGROUND, np.int8), np.full(41, 5.0), np.zeros(3), -1.0, 0.05)
 COVERED = (np.full(3, 0.5), np.full(3, FOREGROUND, np.int8), np.full(3, 5.0), np.zeros(3), -0.05, 0.05)
@@ -97,7 +98,7 @@ def found(bodies: np.ndarray, seconds: float, view: tuple = OPEN) -> list[int]:
     said = []
     for k in range(round(10 * seconds)):
         bodies["seen"] = bodies["a_seen"] = t = NOW + 0.1 * k
-        review(bodies, t, 0.1, *view, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+        review(bodies, t, 0.1, view, WAITS, actions, False, True, False)
         said.append(int(actions[0]))
     return said
 
@@ -216,7 +217,7 @@ def test_two_feet_at_one_place_are_one_thing(apart: float, odd: int, lost: bool)
     for k in range(60):
         bodies["seen"] = t = NOW + 0.1 * k
         bodies["a_seen" if k % 2 else "b_seen"] = t
-        review(bodies, t, 0.1, *OPEN, 0.35, 0.25, 1.5, 60.0, 1.0, actions, False, True, False)
+        review(bodies, t, 0.1, OPEN, WAITS, actions, False, True, False)
         said.append(int(actions[0]))
     assert (LOST in said) == lost
 
