@@ -19,27 +19,19 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
-from floor_contestants import Ours
 from floor_landing import fit
-from numpy.typing import NDArray
+from floor_told import Job, Scan, Told
 
-from tms_agents.floor.adopting import BLANK, adopt, complete
-from tms_agents.floor.assignment import assign
-from tms_agents.floor.association import Association
-from tms_agents.floor.bodies import predict
 from tms_agents.floor.build import SHOES
 from tms_agents.floor.landing import landing
 from tms_agents.floor.likelihood import UNLIKELY
-from tms_agents.floor.nobodys import costs, known
 from tms_agents.floor.settings import Polygon
-from tms_agents.floor.shine import scatter
-from tms_agents.simulation.floor_world import LASERS, SCENARIOS, FloorWorld
+from tms_agents.simulation.floor_world import LASERS, SCENARIOS
 
-#: Who begins to be followed so near (m) somebody is he; somebody so near (m) may be taken for the owner of a foot.
-_HIS_M, _NEAR_M = 0.6, 1.3
+#: Somebody so near (m) may be taken for the owner of a foot.
+_NEAR_M = 1.3
 #: A cluster is fresh for so long (s).
 _FRESH_S = 0.05
 
@@ -84,11 +76,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     scenes = args.scenes.split(",")
     if unknown := set(scenes) - set(SCENARIOS):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENARIOS)}")
-    jobs = [(scene, seed, args.feet, args.laser) for scene in scenes for seed in args.seeds]
+    jobs = [Job(scene, seed, args.feet, args.laser) for scene in scenes for seed in args.seeds]
     with ProcessPoolExecutor(args.jobs) as pool:
         played = list(pool.map(choices, jobs))
     for scene in scenes:
-        made = [one for job, found in zip(jobs, played, strict=True) if job[0] == scene for one in found]
+        made = [one for job, found in zip(jobs, played, strict=True) if job.scene == scene for one in found]
         right = sum(one.right for one in made)
         share = right / max(len(made), 1)
         print(f"{scene}, {args.feet}: {len(made)} landings near others, {share:.3f} likeliest their owner's")
@@ -101,87 +93,27 @@ def _seeds(text: str) -> range:
     return range(first, last + 1)
 
 
-def choices(job: tuple[str, int, Any, str], duration: float | None = None) -> list[Choice]:
-    """Play one world (scene, seed, feet, laser), ``duration`` s of it or all: the landings near others."""
-    scene, seed, feet, laser = job
-    world = FloorWorld(scene, seed, feet=feet, laser=LASERS[laser], duration=duration)
-    sensors = {name: (mount.laser.sweep(), mount.reported) for name, mount in world.sensors.items()}
-    told: list[Told] = []
-
-    def tell(most: int, prints: int, seats: Sequence[Polygon]) -> Told:
-        told.append(Told(most, prints, seats, seed))
-        return told[-1]
-
-    with patch("tms_agents.floor.estimator.Association", tell):
-        ours = Ours(sensors, world.known())
-    for frame in world.scans():
-        plan = world.life.plan
-        inside = [mover for mover in world.life.movers.values() if plan.contains(mover.xy, -0.01)]
-        told[0].people = {world.room.owner(mover.id): mover.xy for mover in inside if mover.walker is not None}
-        told[0].owners = frame.owners
-        ours.scan(frame.sensor, frame.t, frame.ranges, frame.intensities if laser == "fine" else None)
-    return told[0].choices
+def choices(job: Job, duration: float | None = None) -> list[Choice]:
+    """Play one room, ``duration`` s of it or all: the landings near others."""
+    return _Landings.play(job, duration).choices
 
 
-class Told(Association):
-    """Is told whose feet are whose; ``people`` and ``owners`` are the truth about the next scan."""
+class _Landings(Told):
+    """Notes who might have put down each foot."""
 
-    def __init__(self, most: int, prints: int, seats: Sequence[Polygon], seed: int) -> None:
-        super().__init__(most, prints, seats)
-        self._seed = seed
-        self._tracks: dict[int, int] = {}
-        self.people: dict[int, tuple[float, float]] = {}
-        self.owners: NDArray[np.int64] = np.zeros(0, np.int64)
+    def __init__(self, most: int, prints: int, seats: Sequence[Polygon], job: Job) -> None:
+        super().__init__(most, prints, seats, job)
         self.choices: list[Choice] = []
 
-    def step(
-        self, clusters: Any, of: NDArray[np.int64], marks: Any, prints: Any, t: float, sight: Any
-    ) -> NDArray[np.bool_]:
-        predict(self.bodies, t)
-        rows = np.flatnonzero((self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1))
-        self._follow(rows)
-        count, columns = clusters.size, np.full(clusters.size, -1)
-        if count and rows.size:
-            cost = np.empty((count, 2 * rows.size + count))
-            costs(clusters, of, marks, np.ones(count, np.bool_), prints, self.bodies, rows, t, cost)
-            known(clusters, self.bodies, t, cost[:, 2 * rows.size :])
-            owners = [self._owner(c) for c in clusters]
-            right = cost.copy()
-            for column, row in enumerate(rows):
-                others = [i for i, owner in enumerate(owners) if owner < 0 or owner != self._tracks.get(int(row))]
-                right[others, 2 * column : 2 * column + 2] = UNLIKELY
-            assign(right, 2 * rows.size, UNLIKELY, columns)
-            for i in np.flatnonzero(columns < 2 * rows.size):
-                age = t - prints[of[i]]["first"] if of[i] >= 0 else 0.0
-                if age < _FRESH_S:
-                    self._note(clusters[i], cost[i], rows, columns[i] // 2, t - age)
-        free = np.ones(count, np.bool_)
-        adopt(self.bodies, rows, columns, clusters, of, marks, free, BLANK, prints, t, sight)
-        complete(self.bodies, rows, clusters, of, marks, free, BLANK, prints, t, sight, self.seats)
-        scatter(self.bodies, clusters, of, marks, t, self.scattered)
-        return ~free
-
-    def rename(self, t: float) -> None:
-        """Names are right."""
-
-    def _follow(self, rows: Any) -> None:
-        """Whose each of the bodies ``rows`` is: a new one is whose it is near, if he has none."""
-        self._tracks = {row: who for row, who in self._tracks.items() if row in rows}
-        for row in rows.tolist():
-            if row not in self._tracks:
-                xy = float(self.bodies[row]["x"]), float(self.bodies[row]["y"])
-                away = {who: math.dist(xy, at) for who, at in self.people.items() if who not in self._tracks.values()}
-                if away and min(away.values()) < _HIS_M:
-                    self._tracks[row] = min(away, key=lambda who: away[who])
-
-    def _owner(self, c: Any) -> int:
-        met = self.owners[c["first"] : c["last"] + 1]
-        met = met[met >= 0]
-        return int(np.bincount(met).argmax()) if met.size else -1
+    def explained(self, scan: Scan) -> None:
+        for i in np.flatnonzero(scan.columns < 2 * scan.rows.size):
+            age = scan.t - scan.prints[scan.of[i]]["first"] if scan.of[i] >= 0 else 0.0
+            if age < _FRESH_S:
+                self._note(scan.clusters[i], scan.cost[i], scan.rows, scan.columns[i] // 2, scan.t - age)
 
     def _note(self, c: Any, cost: Any, rows: Any, owner: int, since: float) -> None:
         """The foot c, there since that time (s), is one of the body rows[owner]: who else might have put it down?"""
-        choice = Choice(self._seed)
+        choice = Choice(self.job.seed)
         for column, row in enumerate(rows):
             body = self.bodies[row]
             if math.hypot(c["x"] - body["x"], c["y"] - body["y"]) < _NEAR_M and not body["robot"]:

@@ -43,6 +43,24 @@ from town_kernels import deep
 def answer(x):
     return deep.NUMBER + x
 """
+_KERNELS = """
+import importlib, pkgutil, sys
+package = importlib.import_module(sys.argv[1])
+for found in pkgutil.iter_modules(package.__path__, package.__name__ + "."):
+    if not found.ispkg:
+        for name, value in vars(importlib.import_module(found.name)).items():
+            cache = getattr(getattr(value, "_cache", None), "_impl", None)
+            if cache is not None and value.py_func.__module__ == found.name:
+                print(type(cache.locator).__name__, f"{found.name}.{name}")
+"""
+_AGENTS = Path(compiled.__file__).parent
+_WITH_KERNELS = sorted(
+    {
+        ".".join(("tms_agents", *source.relative_to(_AGENTS).parent.parts))
+        for source in _AGENTS.rglob("*.py")
+        if "njit(cache=True" in source.read_text(encoding="utf-8")
+    }
+)
 
 
 @pytest.fixture
@@ -94,3 +112,12 @@ def test_who_names_a_locator_has_it(package: Path) -> None:
     assert run(package, **named) == (3.0, 0)
     (package / "number.py").write_text("NUMBER = 5.0\n")
     assert run(package, **named) == (3.0, 1)  # as numba does it
+
+
+@pytest.mark.parametrize("name", _WITH_KERNELS)
+def test_every_kernel_that_is_kept_has_the_locator(name: str) -> None:
+    """Whichever package is imported first: each in a process of its own, and nothing before it."""
+    done = subprocess.run([sys.executable, "-c", _KERNELS, name], capture_output=True, text=True, check=True)
+    kernels = done.stdout.splitlines()
+    assert kernels
+    assert [line for line in kernels if not line.startswith("KernelLocator ")] == []

@@ -84,8 +84,9 @@ def test_a_wrong_word_is_one_clear_line(benchmark: Any, capsys: pytest.CaptureFi
 
 def test_feet_that_land_near_others_are_mostly_likeliest_their_owners(benchmark: Any) -> None:
     from floor_feet import choices
+    from floor_told import Job
 
-    landings = choices(("three close", 1, "prints", "coarse"), 45.0)
+    landings = choices(Job("three close", 1, "prints", "coarse"), 45.0)
     assert len(landings) > 30 and all(sum(one.owner for one in choice.candidates) == 1 for choice in landings)
     assert sum(choice.right for choice in landings) > 0.7 * len(landings)
 
@@ -93,8 +94,9 @@ def test_feet_that_land_near_others_are_mostly_likeliest_their_owners(benchmark:
 def test_the_fit_begins_with_what_the_estimator_makes_of_a_landing(benchmark: Any) -> None:
     import floor_landing
     from floor_feet import Choice, choices
+    from floor_told import Job
 
-    seen = [one for choice in choices(("three close", 1, "prints", "coarse"), 45.0) for one in choice.candidates]
+    seen = [one for choice in choices(Job("three close", 1, "prints", "coarse"), 45.0) for one in choice.candidates]
     landed = [one for one in seen if one.lands]
     pairs = [Choice(1, [replace(one, owner=True), replace(one, owner=False)]) for one in landed]
     costs = floor_landing._costs(floor_landing._start(), floor_landing._Data(pairs))

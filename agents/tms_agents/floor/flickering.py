@@ -1,18 +1,55 @@
-"""Furniture of which now this part comes back, now that: it is learned where it stands, though nothing of it rests."""
+"""Furniture of which now this part comes back, now that: what is taken for somebody is found out, and learned."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from tms_agents.floor.background import FOREGROUND
+from tms_agents.floor.build import knows_feet
 from tms_agents.floor.furniture import ADOPTED, MOVED
+from tms_agents.floor.norm import norm
 
-#: It is looked at for so long (s), and is no farther (m) around than half of what was seen of it.
+#: Who stays within this (m) for so long (s) is hardly ever so broad (m), in all (s) and in this share of the time:
+#: where people show legs; and where they may show shoes side by side, of whom no feet are known, and of whom they are.
+_STAY_M, _BROAD_M, _BROAD_SHOES_M = 0.6, 0.3, 0.35
+_STAYS_S, _SELDOM_S, _SELDOM = 6.0, 0.6, 0.04
+_STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
+#: What is pushed goes so far (m) at most.
+_PUSHED_M = 1.5
+#: Who was seen so often was as wide (m) as a part of a foot once.
+_OFTEN, _PART_M = 100, 0.06
+#: What flickers is looked at for so long (s), and is no farther (m) around than half of what was seen of it.
 _LEARNED_S, _AROUND_M = 10.0, 0.15
 #: Not while somebody is so near (m).
 _BESIDE_M = 0.8
+
+
+@njit(cache=True)
+def note_breadth(body: Any, dt: float, legs: bool) -> None:
+    """Note for how long (s) it has been seen where it is, and was broader than one who stands."""
+    if norm(body.x - body.stay_x, body.y - body.stay_y) > _STAY_M:
+        body.stay_x, body.stay_y, body.stay, body.stay_broad = body.x, body.y, 0.0, 0.0
+    body.stay += dt
+    if body.broadest > (_BROAD_M if legs else _BROAD_SHOES_M):
+        body.stay_broad += dt
+
+
+@njit(cache=True)
+def flickers(body: Any, legs: bool) -> bool:
+    """Whether it is furniture of which now this comes back, now that: too broad for who stays, or never a foot."""
+    if body.robot or body.machine:
+        return False
+    if norm(body.x - body.x0, body.y - body.y0) > _PUSHED_M and not knows_feet(body):
+        # It came by itself: a robot, maybe.
+        return False
+    stays, least, share = _STAYS_S, _SELDOM_S, _SELDOM
+    if not legs and knows_feet(body):
+        stays, least, share = _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN
+    broad = body.stay > stays and body.stay_broad > max(least, share * body.stay)
+    return bool(broad or (body.hits > _OFTEN and body.far < _PART_M))
 
 
 class Flickering:
@@ -27,6 +64,7 @@ class Flickering:
         """What was taken for the body (`state.BODY`) is furniture."""
         self.places.append((float(body["x"]), float(body["y"]), 0.5 * float(body["far"]) + _AROUND_M, _LEARNED_S))
         self._t = t
+        body["stay"] = body["stay_broad"] = 0.0
 
     def step(self, view: Any, clusters: Any, bodies: Any, t: float) -> int:
         """Learn what of the clusters (m,) is a part of it as background; what is not moves to the front: how many."""

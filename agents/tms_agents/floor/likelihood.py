@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor import fitted
 from tms_agents.floor.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, scant, together
 from tms_agents.floor.build import (
     LEGS_KNOWN,
@@ -20,6 +21,7 @@ from tms_agents.floor.build import (
     sole,
     wears_shoes,
 )
+from tms_agents.floor.fitted import Legs, Shoes
 from tms_agents.floor.landing import landing
 from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import lay_before
@@ -29,8 +31,8 @@ from tms_agents.floor.state import SEATED
 Array = NDArray[np.float64]
 
 UNLIKELY = 1e6
-#: Feet are so far from the body along its way and aside (m); nobody's foot is farther away than this.
-_ALONG_M, _ASIDE_M, _REACH_M, _ROBOT_M = 0.4, 0.24, 1.3, 1.0
+#: Nobody's foot is farther away from the body than this (m), and no part of a robot.
+_REACH_M, _ROBOT_M = 1.3, 1.0
 #: Who has sat down gets up with a foot so near (m) one of his.
 _RISES_M = 0.9
 #: Where hardly anything comes back a beam or two so near (m) one of his feet are it.
@@ -45,20 +47,13 @@ _BROAD_M = 0.45
 _BESIDE_M, _STAYS_S = 0.2, 2.0
 #: From its narrow side it looks at least this share as wide as from corner to corner.
 _NARROWEST = 0.4
-#: Negative log likelihood: of a foot seen just now being somewhere else, of having landed where something stood
-#: before, of swinging while the other foot swings.
-_SEEN, _STOLEN, _BOTH = 3.0, 4.0, 5.0
 #: What was his foot so long (s) ago may be again: something flickered beside it.
 _LATELY_S = 0.5
 #: What still stands after so long (s) while the other foot goes may be no foot.
-_LEFT_S, _LEFT = 1.0, 0.5
-#: A shoe that rolls off from the heel to the toes seems to move so far: usually, at most (m).
-_ROLL_M, _ROLLED_M = 0.08, 0.17
+_LEFT_S = 1.0
 #: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
 #: alike.
 LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
-#: The same of the length of a shoe; the sine of how far it points from the way.
-_SOLE_M, _TURNED = 0.015, 0.5
 #: Negative log likelihood of a foot wider than a leg although the other one is elsewhere: up to as wide as two legs
 #: side by side (m), and wider; or longer than a shoe.
 _PAIR_M, _PAIR, _TOO_WIDE = 0.27, 2.0, 4.0
@@ -76,22 +71,23 @@ def _apart(dx: float, dy: float, body: Any, speed: float, along: float, aside: f
 
 
 @njit(cache=True)
-def _strides_on(dx: float, dy: float, body: Any, speed: float, side: float) -> float:
+def _strides_on(dx: float, dy: float, body: Any, speed: float, side: float, legs: Legs) -> float:
     """The same of a leg put (dx, dy) from the other: a stride ahead and on its own side."""
     ux, uy = body.vx / speed, body.vy / speed
     ahead, aside = dx * ux + dy * uy - body.stride, dy * ux - dx * uy - side
-    return float(0.5 * (ahead**2 / (0.15**2 + 0.2 * body.pp) + aside**2 / (0.1**2 + 0.2 * body.pp)) + 2.4)
+    along, across = legs.stride_m**2 + 0.2 * body.pp, legs.stride_aside_m**2 + 0.2 * body.pp
+    return float(0.5 * (ahead**2 / along + aside**2 / across) + legs.strides)
 
 
 @njit(cache=True)
-def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float, dt: float) -> float:
+def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float, dt: float, legs: Legs) -> float:
     """The same of a foot that has moved by (dx, dy) in dt s: it goes straight on (u, v m/s), or begins to swing."""
     pace = norm(u, v)
     if pace > 0.4:
         along, aside = (dx * u + dy * v) / pace, (dy * u - dx * v) / pace
         over = max(-along, along - pace * dt - 2.5 * dt, 0.0)
-        wide = 0.045 + 0.2 * dt
-        return float(0.5 * (aside / wide) ** 2 + 0.5 * (over / 0.06) ** 2 + 1.7)
+        wide = legs.swings_aside_m + legs.swings_aside_mps * dt
+        return float(0.5 * (aside / wide) ** 2 + 0.5 * (over / legs.beyond_m) ** 2 + legs.goes_on)
     reach = 3.0 * max(speed, 0.4) * dt
     if speed > 0.3:
         ux, uy = body.vx / speed, body.vy / speed
@@ -101,7 +97,17 @@ def _swinging(dx: float, dy: float, u: float, v: float, body: Any, speed: float,
         away = norm(dx, dy)
         share = max(away - reach, 0.0) / max(away, 1e-6)
         dx, dy = dx * share, dy * share
-    return float(0.5 * (dx * dx + dy * dy) / 0.1**2 + 2.5)
+    return float(0.5 * (dx * dx + dy * dy) / legs.begins_m**2 + legs.begins)
+
+
+@njit(cache=True)
+def _anywhere(c: Any, body: Any, speed: float, age: float, legs: Legs) -> float:
+    """The same of a leg put down anywhere near, of what has stood there for so long (``age``, s)."""
+    dx, dy = c.x - body.x, c.y - body.y
+    ahead_x, ahead_y = legs.ahead_s * body.vx, legs.ahead_s * body.vy
+    value = _apart(dx - ahead_x, dy - ahead_y, body, speed, legs.ahead_m, legs.ahead_aside_m) + legs.anywhere
+    value = min(value, 0.5 * (dx * dx + dy * dy) / (legs.around_m**2 + body.pp) + legs.around)
+    return float(value + (legs.stood if age > 0.5 else 0.0))
 
 
 @njit(cache=True)
@@ -123,15 +129,15 @@ def too_wide(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
-def _another_shoe(body: Any, c: Any) -> float:
+def _another_shoe(body: Any, c: Any, shoes: Shoes) -> float:
     """Negative log likelihood of a shoe that is longer or shorter than his, or does not point where he goes."""
     if body.shoe < SHOES or not from_side(c):
         return 0.0
     value = 0.0
     if body.own_sole_n >= SHOES_KNOWN:
-        value += 0.5 * min(((sole(c) - body.own_sole) / _SOLE_M) ** 2, _OTHER)
+        value += min(0.5 * ((sole(c) - body.own_sole) / shoes.sole_m) ** 2, shoes.another)
     if norm(body.vx, body.vy) > WALKS:
-        value += 0.5 * min((astray(body, c) / _TURNED) ** 2, _OTHER)
+        value += min(0.5 * (astray(body, c) / shoes.turned) ** 2, shoes.astray)
     return value
 
 
@@ -163,11 +169,29 @@ def feet(
     cost: Array,
 ) -> None:
     """Fill ``cost`` (m, 2): what it costs that the clusters (m,) that are ``free`` are the feet of the body ``row``."""
+    feet_by(fitted.LEGS, fitted.SHOES, clusters, of, marks, free, prints, bodies, row, t, cost)
+
+
+@njit(cache=True)
+def feet_by(
+    legs: Legs,
+    shoes: Shoes,
+    clusters: Any,
+    of: NDArray[np.int64],
+    marks: Array,
+    free: NDArray[np.bool_],
+    prints: Any,
+    bodies: Any,
+    row: int,
+    t: float,
+    cost: Array,
+) -> None:
+    """As `feet`, by other numbers than those in use."""
     body = bodies[row]
     for i in range(clusters.size):
         cost[i, :] = UNLIKELY
         if free[i]:
-            _foot(clusters[i], of[i], marks[i], prints, body, row, t, cost[i])
+            _foot(legs, shoes, clusters[i], of[i], marks[i], prints, body, row, t, cost[i])
     for i in range(clusters.size):
         if free[i] and together(body, clusters, i, t):
             # Both feet in one cluster: whatever else is near is not a foot of this body.
@@ -179,7 +203,18 @@ def feet(
 
 
 @njit(cache=True)
-def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t: float, cost: Array) -> None:
+def _foot(
+    legs: Legs,
+    shoes: Shoes,
+    c: Any,
+    print_: int,
+    marks: Array,
+    prints: Any,
+    body: Any,
+    row: int,
+    t: float,
+    cost: Array,
+) -> None:
     """Lower ``cost`` (2,) to that of the cluster c, on ``print_`` (-1: none), being the first and the second foot."""
     if body.footprint:
         # What is its own is known (`footprints`).
@@ -213,7 +248,9 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         return
     lately = print_ >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
     speed = norm(body.vx, body.vy)
-    base = _apart(c.x - body.x, c.y - body.y, body, speed, _ALONG_M, _ASIDE_M)
+    shod = body.shoe >= SHOES
+    along, aside = (shoes.along_m, shoes.aside_m) if shod else (legs.along_m, legs.aside_m)
+    base = _apart(c.x - body.x, c.y - body.y, body, speed, along, aside)
     shape = unlike(body, marks)
     if c.width > WIDE_M:
         shape += 3.0
@@ -223,12 +260,9 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
         shape += 2.0 if c.n == 1 else 6.0
     if c.attached:
         shape += 4.0
-    shape += _stouter(body, c) + _another_shoe(body, c)
+    shape += _stouter(body, c) + _another_shoe(body, c, shoes)
     broad = too_wide(body, c)
-    anywhere = _apart(c.x - body.x - 0.12 * body.vx, c.y - body.y - 0.12 * body.vy, body, speed, 0.32, 0.24) + 4.3
-    anywhere = min(anywhere, 0.5 * away * away / (0.45**2 + body.pp) + 5.2)
-    if age > 0.5:
-        anywhere += 1.0
+    anywhere = 0.0 if shod else _anywhere(c, body, speed, age, legs)
     for which in range(2):
         if which == 0:
             x, y, u, v, seen, standing = body.ax, body.ay, body.a_vx, body.a_vy, body.a_seen, body.a_print
@@ -242,41 +276,46 @@ def _foot(c: Any, print_: int, marks: Array, prints: Any, body: Any, row: int, t
             left = t - body.b_since > _LEFT_S and t - body.a_since < FRESH_S
         gap = t - seen
         off = (c.x - x) ** 2 + (c.y - y) ** 2
+        stands = 0.5 * off / (shoes.stand_m if shod else STAND_M) ** 2
         value = UNLIKELY
         if standing >= 0 and standing == print_:
-            value = base + min(0.5 * off / STAND_M**2, 2.0) + (_LEFT if left else 0.0)
+            value = base + min(stands, shoes.moved if shod else legs.moved)
+            if left:
+                value += shoes.left if shod else legs.left
         elif gap < 1.0 or body.stale:
-            value = base + 0.5 * off / STAND_M**2
-        if body.shoe >= SHOES:
+            value = base + stands
+        if shod:
             if gap < 0.35:
-                value = min(value, base + 0.5 * off / _ROLL_M**2 + 1.0 if off < _ROLLED_M**2 else UNLIKELY)
+                rolls = base + 0.5 * off / shoes.rolls_m**2 + shoes.rolls
+                value = min(value, rolls if off < shoes.farthest_m**2 else UNLIKELY)
         elif gap < 0.35:
-            swing = base + _swinging(c.x - x, c.y - y, u, v, body, speed, gap)
+            swing = base + _swinging(c.x - x, c.y - y, u, v, body, speed, gap, legs)
             if swings > 0.5 and t - other < 0.22:
-                swing += _BOTH
+                swing += legs.both
             value = min(value, swing)
         if broad > 0.0 and t - other < 0.2 and norm(c.x - ox, c.y - oy) > 0.5 * c.width + _GIRTH_M:
             value += broad
         step = anywhere
-        if body.shoe >= SHOES:
+        if shod:
             step = landing(body, c, ox, oy, seen, landed, t - age)
         elif gap < 0.22 and not left:
             # Seen just now, it cannot be far, unless it was something that was left behind.
-            step += _SEEN + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / 0.1) ** 2
+            step += legs.seen + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / legs.seen_m) ** 2
         elif gap > 1.0 and not left:
             # It must be somewhere.
-            step -= 1.0
+            step -= legs.lost
         if left:
-            step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / 0.35**2 + 4.2)
-        if age > gap + 0.15 and (not lately or (body.shoe >= SHOES and beside == print_)):
+            near, beside_it = (shoes.beside_m, shoes.beside) if shod else (legs.beside_m, legs.beside)
+            step = min(step, 0.5 * ((c.x - ox) ** 2 + (c.y - oy) ** 2) / near**2 + beside_it)
+        if age > gap + 0.15 and (not lately or (shod and beside == print_)):
             # Whatever stands here came while this foot was somewhere else.
-            step += _STOLEN
+            step += shoes.stolen if shod else legs.stolen
         if age >= FRESH_S and q.owner != row and not lately:
             # What has stood there for long is hardly a foot, except that of somebody who stands.
-            value = min(value, step + 2.5)
+            value = min(value, step + (shoes.rested if shod else legs.rested))
         else:
             value = min(value, step)
-            if body.shoe < SHOES and speed > 0.35 and gap < 1.3 and t - other < 0.4:
+            if not shod and speed > 0.35 and gap < 1.3 and t - other < 0.4:
                 side = body.side if which == 0 else -body.side
-                value = min(value, _strides_on(c.x - ox, c.y - oy, body, speed, side) + step - anywhere)
+                value = min(value, _strides_on(c.x - ox, c.y - oy, body, speed, side, legs) + step - anywhere)
         cost[which] = shape + value

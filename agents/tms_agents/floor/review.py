@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
-from tms_agents.floor.build import SHOES, knows_feet
+from tms_agents.floor.build import SHOES
+from tms_agents.floor.flickering import flickers, note_breadth
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.lone import count_lone, has_come, has_walked
 from tms_agents.floor.masks import distance
@@ -43,15 +44,6 @@ _SIDE_BY_SIDE_M, _BLOCK_M, _SETTLED_S = 0.26, 0.18, 8.0
 _BESIDE = 0.15
 #: Who stays within this (m) rests.
 _REST_M = 0.15
-#: Who stays within this (m) for so long (s) is hardly ever so broad (m), in all (s) and in this share of the time:
-#: where people show legs; and where they may show shoes side by side, of whom no feet are known, and of whom they are.
-_STAY_M, _BROAD_M, _BROAD_SHOES_M = 0.6, 0.3, 0.35
-_STAYS_S, _SELDOM_S, _SELDOM = 6.0, 0.6, 0.04
-_STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
-#: What is pushed goes so far (m) at most.
-_PUSHED_M = 1.5
-#: Who was seen so often was as wide (m) as a part of a foot once.
-_OFTEN, _PART_M = 100, 0.06
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run if it is so narrow (m) in the mean.
 _QUALITY, _THIN_M = 0.3, 0.05
 #: Who was seen so often is somebody.
@@ -125,31 +117,6 @@ def _is_parked(body: Any, t: float, legs: bool) -> bool:
     rests = t - body.rest_at
     broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
     return bool((broad and rests > _PARKED_S) or (is_footless(body) and rests > 2.0 * _PARKED_S))
-
-
-@njit(cache=True)
-def _stays(body: Any, dt: float, legs: bool) -> None:
-    """Note for how long (s) it has been seen where it is, and was broader than one who stands."""
-    if norm(body.x - body.stay_x, body.y - body.stay_y) > _STAY_M:
-        body.stay_x, body.stay_y, body.stay, body.stay_broad = body.x, body.y, 0.0, 0.0
-    body.stay += dt
-    if body.broadest > (_BROAD_M if legs else _BROAD_SHOES_M):
-        body.stay_broad += dt
-
-
-@njit(cache=True)
-def _flickers(body: Any, legs: bool) -> bool:
-    """Whether it is furniture of which now this comes back, now that: too broad for who stays, or never a foot."""
-    if body.robot or body.machine:
-        return False
-    if norm(body.x - body.x0, body.y - body.y0) > _PUSHED_M and not knows_feet(body):
-        # It came by itself: a robot, maybe.
-        return False
-    stays, least, share = _STAYS_S, _SELDOM_S, _SELDOM
-    if not legs and knows_feet(body):
-        stays, least, share = _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN
-    broad = body.stay > stays and body.stay_broad > max(least, share * body.stay)
-    return bool(broad or (body.hits > _OFTEN and body.far < _PART_M))
 
 
 @njit(cache=True)
@@ -243,7 +210,7 @@ def review(
         if unseen == 0.0:
             if norm(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
                 body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
-            _stays(body, dt, legs)
+            note_breadth(body, dt, legs)
         if not body.confirmed:
             actions[b] = _new(bodies, b, t, sight, waits, learned)
         elif unseen == 0.0:
@@ -314,8 +281,7 @@ def _seen(bodies: Any, b: int, t: float, dt: float, sight: Any, legs: bool) -> i
         return LOST
     if (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or _is_parked(body, t, legs):
         return THING
-    if _flickers(body, legs):
-        body.stay = body.stay_broad = 0.0
+    if flickers(body, legs):
         return FLICKERS
     if body.stale:
         return BACK

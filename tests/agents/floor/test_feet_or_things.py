@@ -169,7 +169,7 @@ def test_what_was_his_foot_a_moment_ago_may_be_again() -> None:
     for label, each in zip((7, 3), cost, strict=True):
         prints["whose"], prints["owned"] = label, NOW - 0.1
         costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, NOW, each)
-    assert cost[1, 0, 0] < cost[0, 0, 0] - 2.0
+    assert cost[1, 0, 0] < cost[0, 0, 0] - 1.0
 
 
 @pytest.mark.parametrize(
