@@ -13,7 +13,7 @@ from tms_agents.floor.adopting import BLANK, adopt_from, chosen, complete
 from tms_agents.floor.assignment import reassign, solve, work
 from tms_agents.floor.bodies import begin, predict
 from tms_agents.floor.build import agree
-from tms_agents.floor.hypotheses import ALL, FEET, copy, first_like, same_places, settle
+from tms_agents.floor.hypotheses import ALL, FEET, copy, exchange, first_like, same_places, settle
 from tms_agents.floor.identity import christen, renamed, unite
 from tms_agents.floor.left_feet import put
 from tms_agents.floor.likelihood import UNLIKELY, feet
@@ -59,11 +59,11 @@ def _advance(
     nobodys_at: Array,
     spare_nobodys_at: Array,
 ) -> int:
-    """One scan for all ``hypotheses`` (kept, n) of bodies, best first, with ``scores`` (kept,): how many there are.
+    """One scan for all ``hypotheses`` (kept, n) of bodies with ``scores`` (kept,): how many there are now in ``spare``.
 
-    ``raw`` (kept, n, fields) are the same ``hypotheses`` as integers, ``pool`` is scratch for bodies. ``taken`` (m,)
-    becomes which clusters are somebody's in the best. ``nobodys_at`` (kept, p) is when each print was last seen to be
-    nobody's who is believed.
+    The best is the first. ``raw`` (kept, n, fields) are the same ``hypotheses`` as integers, ``pool`` is scratch for
+    bodies. ``taken`` (m,) becomes which clusters are somebody's in the best. ``nobodys_at`` (kept, p) is when each
+    print was last seen to be nobody's who is believed.
     """
     n, m = hypotheses.shape[1], clusters.size
     most = count * (m + 1)
@@ -131,11 +131,11 @@ def _advance(
         scores[kept] = score
         kept += 1
     best = int(np.argmin(scores[:kept]))
-    for h in range(kept):
-        source = best if h == 0 else (0 if h == best else h)
-        copy(spare[source], spare_beliefs[source], hypotheses[h], beliefs[h], True)
-        nobodys_at[h] = spare_nobodys_at[source]
-    scores[0], scores[best] = scores[best], scores[0]
+    if best:
+        exchange(spare[0], spare_beliefs[0], spare[best], spare_beliefs[best], hypotheses[0], beliefs[0])
+        for p in range(spare_nobodys_at.shape[1]):
+            spare_nobodys_at[0, p], spare_nobodys_at[best, p] = spare_nobodys_at[best, p], spare_nobodys_at[0, p]
+        scores[0], scores[best] = scores[best], scores[0]
     scores[:kept] -= scores[0]
     for i in range(m):
         taken[i] = owned[best, i]
@@ -221,6 +221,7 @@ class Association:
         self._pool = empty(BODY, _POOL)
         # All fields are as long as an integer: what is the same to the last bit is found by these.
         self._raw = self._hypotheses.view(np.int64).reshape(_KEPT, most, -1)
+        self._spare_raw = self._spare.view(np.int64).reshape(_KEPT, most, -1)
         self._before, self._decided = np.zeros_like(self._raw[0]), np.zeros(most, np.bool_)
         self._beliefs, self._spare_beliefs = np.zeros((_KEPT, most, most)), np.zeros((_KEPT, most, most))
         self._beliefs[:] = np.eye(most)
@@ -229,7 +230,11 @@ class Association:
         self._scores = np.zeros(_KEPT)
         self._count = 1
         self.scattered = expected()
-        self.bodies = self._hypotheses[0]
+
+    @property
+    def bodies(self) -> Any:
+        """Those of the best hypothesis, until the next scan."""
+        return self._hypotheses[0]
 
     def step(
         self, clusters: Any, of: NDArray[np.int64], marks: Array, prints: Any, t: float, sight: Any
@@ -258,6 +263,10 @@ class Association:
             self._nobodys_at,
             self._spare_nobodys_at,
         )
+        self._hypotheses, self._spare = self._spare, self._hypotheses
+        self._raw, self._spare_raw = self._spare_raw, self._raw
+        self._beliefs, self._spare_beliefs = self._spare_beliefs, self._beliefs
+        self._nobodys_at, self._spare_nobodys_at = self._spare_nobodys_at, self._nobodys_at
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return taken
 

@@ -122,7 +122,7 @@ class FloorEstimator:
         return {name: self._extrinsics.pose(view.index) for name, view in self._views.items()}
 
     def _understand(self, view: View, states: NDArray[np.int8], t: float, dt: float, lights: Array) -> list[FloorEvent]:
-        bodies, prints = self._tracks.bodies, self._prints
+        bodies, prints = self._association.bodies, self._prints
         objects = self._objects
         look(
             objects.things,
@@ -155,6 +155,7 @@ class FloorEstimator:
         note(prints, clusters, of, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
         somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
+        bodies = self._association.bodies
         count_shoes(bodies, clusters[:feet], of[:feet], t, self._shoes)
         self._association.agree(self._shoes)
         self._association.mark()

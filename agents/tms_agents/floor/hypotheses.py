@@ -93,6 +93,14 @@ def copy(source: Any, source_belief: Array, target: Any, target_belief: Array, b
 
 
 @njit(cache=True)
+def exchange(one: Any, one_belief: Array, two: Any, two_belief: Array, between: Any, between_belief: Array) -> None:
+    """Exchange two hypotheses by way of a third, which is overwritten."""
+    copy(one, one_belief, between, between_belief, True)
+    copy(two, two_belief, one, one_belief, True)
+    copy(between, between_belief, two, two_belief, True)
+
+
+@njit(cache=True)
 def settle(
     hypotheses: Any,
     raw: Integers,

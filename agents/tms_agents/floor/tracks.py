@@ -77,7 +77,6 @@ class Tracks:
 
     def __init__(self, association: Association, settings: FloorSettings, scene: Scene) -> None:
         self._association = association
-        self.bodies = association.bodies
         self._settings = settings
         self._waits = Waits(*(getattr(settings, name) for name in Waits._fields))
         self._where = Whereabouts(scene)
@@ -88,6 +87,11 @@ class Tracks:
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
+
+    @property
+    def bodies(self) -> Any:
+        """All there may be in the best hypothesis, until the next scan."""
+        return self._association.bodies
 
     def review(
         self,
