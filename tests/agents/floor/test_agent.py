@@ -7,11 +7,15 @@ import contextlib
 import math
 
 import numpy as np
+import pytest
 from floor_rig import COMES, DOORS, PUT_AT, QUICK, Playing, Room, agent, laser_toml
 
 from tms_agents.devices.emulation import TcpLine
 from tms_agents.devices.scip import ScipDevice
 from tms_agents.floor.formats import read_scans
+
+# The estimator compiles where it never ran before.
+pytestmark = pytest.mark.timeout(600)
 
 POSE = (2.5, 0.05, math.pi / 2)
 SOON_S = 5.0
@@ -49,7 +53,7 @@ async def test_a_walker_who_leaves_a_thing(rig):
     async with laser.line() as line:
         floor = rig(scip(line), more='[recording]\npath = "floor.scans"\n' + QUICK + DOORS)
         async with agent(floor.config):
-            await floor.state("connected", "SCIP laser", timeout_s=180.0)
+            await floor.state("connected", "SCIP laser", timeout_s=400.0)
             await asyncio.sleep(2.0)  # the room is learnt
             playing = Playing(room, start=COMES)
             laser.play = playing.step
@@ -60,7 +64,7 @@ async def test_a_walker_who_leaves_a_thing(rig):
         # Ended and started again: the thing keeps its label, nothing new appears.
         async with agent(floor.config):
             await asyncio.sleep(0.5)
-            await floor.state("connected", "SCIP laser", timeout_s=180.0)
+            await floor.state("connected", "SCIP laser", timeout_s=400.0)
             await asyncio.sleep(2.5)  # the inventory after a device came back
             assert [(one.label, one.since) for one in (await floor.labels()).values()] == [(thing.label, thing.since)]
             assert await floor.labels("mover") == {}
@@ -80,7 +84,7 @@ async def test_faults_of_a_laser(rig):
     async with laser.line() as line:
         floor = rig(scip(line), more=QUICK)
         async with floor.agent():
-            await floor.state("connected", "SCIP laser", timeout_s=180.0)
+            await floor.state("connected", "SCIP laser", timeout_s=400.0)
             await asyncio.sleep(2.0)
             room.put("thing", *PUT_AT)
             (before,) = (await floor.count(1)).values()

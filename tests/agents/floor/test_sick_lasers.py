@@ -17,6 +17,9 @@ from tms_agents.devices.emulation import PtyLine, TcpLine
 from tms_agents.devices.lms200 import Lms200Device
 from tms_agents.devices.scans import Sweep
 
+# The estimator compiles where it never ran before.
+pytestmark = pytest.mark.timeout(600)
+
 POSE = (2.5, 0.05, math.pi / 2)
 
 
@@ -54,9 +57,9 @@ async def test_a_thing_put_down_and_taken_again(rig, open_, told):
     async with open_(room) as (device, toml):
         floor = rig(toml, more=QUICK)
         async with floor.agent():
-            await floor.state("connected", told, timeout_s=180.0)
+            await floor.state("connected", told, timeout_s=400.0)
             await asyncio.sleep(1.0)  # the first scan compiles the estimator, and the line may be lost meanwhile
-            await floor.state("connected", told, timeout_s=180.0)
+            await floor.state("connected", told, timeout_s=400.0)
             await asyncio.sleep(3.0)  # the room is learnt
             room.put("thing", *PUT_AT)
             (thing,) = (await floor.count(1)).values()
