@@ -107,7 +107,7 @@ class Understanding:
         async with self._warming:
             if not self._warm:
                 if not compiled_before():
-                    log.info("compiling the estimator, which happens at the first start only (up to a minute) ...")
+                    log.info("compiling the estimator, which happens at the first start only (a minute or two) ...")
                 await self.call(warm_up)
                 self._warm = True
 

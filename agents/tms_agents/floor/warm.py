@@ -33,7 +33,7 @@ def _kept(kernel: Any) -> bool:
 
 
 def warm_up() -> None:
-    """Takes a quarter of a second, or, the first time on a computer, up to a minute."""
+    """Takes a quarter of a second, or, the first time on a computer, a minute or two."""
     angles = np.linspace(-1.2, 1.2, _BEAMS)
     sweep = Sweep(angles, 0.0, 1 / _HZ, 0.02, 5.0)
     settings = FloorSettings(learn_s=0.5, start_s=0.2, rest_s=0.4, alone_s=0.2)

@@ -36,4 +36,4 @@ def say_if_it_compiles(say: Callable[[str], None]) -> None:
     from tms_agents.floor.warm import compiled_before  # needs numba and scipy, as the laser does
 
     if not compiled_before():
-        say("compiling the floor's estimator, which happens at the first start only (up to a minute) ...")
+        say("compiling the floor's estimator, which happens at the first start only (a minute or two) ...")

@@ -15,8 +15,8 @@ from tms_schemas.observation import Observation
 STEP_S = 0.1
 #: Real seconds between two looks at what the agents told, and after which an agent is late.
 LOOK_S, LATE_S = 0.05, 60.0
-#: The agents take longer to start where something is compiled first.
-START_S = 180.0
+#: The agents take minutes to start where something is compiled first, on a slow machine.
+START_S = 600.0
 
 
 class FloorSensor(Protocol):
