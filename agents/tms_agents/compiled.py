@@ -28,13 +28,21 @@ class KernelLocator:
     """Where numba's own locator keeps a kernel, but with `stamp` for those of this package."""
 
     def __init__(self, found: Any, source: Path) -> None:
-        self._source = source
+        self._found, self._source = found, source
         self.get_cache_path: Callable[[], str] = found.get_cache_path
-        self.ensure_cache_path: Callable[[], None] = found.ensure_cache_path
-        self.get_disambiguator: Callable[[], str] = found.get_disambiguator
 
     def get_source_stamp(self) -> bytes:
         return stamp(self._source)
+
+    def get_disambiguator(self) -> str:
+        return f"{self._found.get_disambiguator()}-{version(self._source)}"
+
+    def ensure_cache_path(self) -> None:
+        """Called before a kernel is kept: those of the same file as it was before go."""
+        self._found.ensure_cache_path()
+        for kept in Path(self.get_cache_path()).glob(f"{self._source.stem}.*.nb[ci]"):
+            if version(self._source) not in kept.name:
+                kept.unlink(missing_ok=True)
 
     @classmethod
     def from_function(cls, kernel: Callable[..., Any], source: str) -> Any:
@@ -55,6 +63,11 @@ if not _config.CACHE_LOCATOR_CLASSES:  # ``NUMBA_CACHE_LOCATOR_CLASSES``: who se
 def stamp(source: Path) -> bytes:
     """A digest of all that a kernel in this file may have been compiled from."""
     return hashlib.sha256(b"".join(_digest(one) for one in sorted(sources(source)))).digest()
+
+
+def version(source: Path) -> str:
+    """The same in short, as it is in the names of the files in which kernels are kept."""
+    return stamp(source).hex()[:12]
 
 
 @cache

@@ -17,6 +17,11 @@ import town_kernels.compiled
 from town_kernels.caller import answer
 print(answer(1.0), sum(answer.stats.cache_hits.values()))
 """
+_KILLED = """
+import os
+from numba.core.caching import IndexDataCacheFile
+IndexDataCacheFile._save_data = lambda self, name, data: os._exit(0)
+"""
 _CALLER = """
 from numba import njit
 from town_kernels.callee import (
@@ -77,13 +82,18 @@ def package(tmp_path: Path) -> Path:
     return package
 
 
-def run(package: Path, **environment: str) -> tuple[float, int]:
+def run(package: Path, **extra: str) -> tuple[float, int]:
     """What the kernel says in a process of its own, and how many kernels it found on disk."""
-    mine = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    mine |= {"PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    mine = environment(package) | extra
     done = subprocess.run([sys.executable, "-c", _RUN], env=mine, capture_output=True, text=True, check=True)
     said, found = done.stdout.split()
     return float(said), int(found)
+
+
+def environment(package: Path) -> dict[str, str]:
+    """Of a process that runs the kernels."""
+    mine = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    return mine | {"PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 @pytest.mark.parametrize("folder", ["", "elsewhere"])
@@ -96,6 +106,23 @@ def test_what_a_kernel_calls_has_changed(package: Path, tmp_path: Path, folder: 
     (package / "number.py").write_text("NUMBER = 5.0\n")
     assert run(package, **where) == (6.0, 0)
     assert run(package, **where) == (6.0, 1)
+
+
+def test_a_process_is_killed_while_it_keeps_a_kernel(package: Path) -> None:
+    """Its index is written, what that points to is not: there is the code of the version before."""
+    assert run(package) == (3.0, 0)
+    (package / "number.py").write_text("NUMBER = 5.0\n")
+    subprocess.run([sys.executable, "-c", _KILLED + _RUN], env=environment(package), check=True)
+    assert run(package)[0] == 6.0
+
+
+def test_kernels_of_the_version_before_go(package: Path) -> None:
+    run(package)
+    before = {path.name for path in package.rglob("*.nb[ci]")}
+    (package / "number.py").write_text("NUMBER = 5.0\n")
+    run(package)
+    after = {path.name for path in package.rglob("*.nb[ci]")}
+    assert len(after) == len(before) and not after & before
 
 
 def test_what_is_imported_is_a_module_or_comes_by_a_package(package: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tms_agents.compiled import sources
+from tms_agents.compiled import version
 from tms_agents.devices.scans import Sweep
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
 from tms_agents.floor.dark import dark_width
@@ -27,9 +27,8 @@ def compiled_before() -> bool:
 
 def _kept(kernel: Any) -> bool:
     source = Path(inspect.getfile(kernel.py_func)).resolve()
-    files = Path(kernel.stats.cache_path).glob(f"{source.stem}.{kernel.py_func.__name__}-*.nbi")
-    changed = max(one.stat().st_mtime for one in sources(source))
-    return any(one.stat().st_mtime >= changed for one in files)
+    name = f"{source.stem}.{kernel.py_func.__name__}-*-{version(source)}.*.nbi"
+    return any(Path(kernel.stats.cache_path).glob(name))
 
 
 def warm_up() -> None:
