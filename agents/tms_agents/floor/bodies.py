@@ -121,6 +121,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.lone_x, body.lone_y = c.x, c.y
     body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
     body.stay_x, body.stay_y, body.stay, body.stay_broad, body.broadest = c.x, c.y, 0.0, 0.0, c.width
+    body.stay_thin, body.stay_lands, body.spacing = 0.0, 0.0, c.spacing
     body.shoe, body.leg, body.odd = 0.0, 0.0, 0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
@@ -217,6 +218,7 @@ def update(
     width = max(c.width if has_c else 0.0, d.width if has_d else 0.0)
     # Both feet in one are as broad as they like.
     body.broadest = 0.0 if one and knows_feet(body) else width
+    body.spacing = c.spacing if has_c else d.spacing
     body.wide += 0.05 * ((1.0 if width > WIDE_M else 0.0) - body.wide)
     if body.hits > 20:
         if body.wide > 0.5 and body.both < _TWO_FEET * body.hits:

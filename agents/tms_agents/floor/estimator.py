@@ -50,8 +50,8 @@ _EDGE_M = 0.12
 _MUTE_S, _DARK_M = 1.0, 0.3
 #: So often (s) it is looked how far the lasers see, where no gates are told.
 _LOOKS_S = 2.0
-#: Of saved states; 17: for how long who stays is broader than feet.
-_FORMAT = 17
+#: Of saved states; 18: for how long who stays is thinner than feet, and how often feet land.
+_FORMAT = 18
 
 
 class FloorEstimator:

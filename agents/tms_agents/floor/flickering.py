@@ -17,6 +17,12 @@ from tms_agents.floor.norm import norm
 _STAY_M, _BROAD_M, _BROAD_SHOES_M = 0.6, 0.3, 0.35
 _STAYS_S, _SELDOM_S, _SELDOM = 6.0, 0.6, 0.04
 _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
+#: Nor does he look so thin (m) for so much of the time, where people show legs and where they may show shoes; of shoes
+#: that far away that beams are farther apart than this (m) hardly more comes back, but not for so long (s).
+_THIN_M, _THIN_LEGS, _THIN_SHOES = 0.05, 0.4, 0.7
+_FAR_M, _STAYS_FAR_S = 0.022, 25.0
+#: Nobody's feet land so often (1/s) in so long (s).
+_LANDS_S, _LEGS_LAND, _SHOES_LAND = 8.0, 4.5, 3.5
 #: What is pushed goes so far (m) at most.
 _PUSHED_M = 1.5
 #: Who was seen so often was as wide (m) as a part of a foot once.
@@ -28,28 +34,54 @@ _BESIDE_M = 0.8
 
 
 @njit(cache=True)
-def note_breadth(body: Any, dt: float, legs: bool) -> None:
-    """Note for how long (s) it has been seen where it is, and was broader than one who stands."""
+def note_stay(body: Any, dt: float, legs: bool) -> None:
+    """Note how long (s) it is seen where it is, broader or thinner than who stands, and how often feet landed."""
     if norm(body.x - body.stay_x, body.y - body.stay_y) > _STAY_M:
-        body.stay_x, body.stay_y, body.stay, body.stay_broad = body.x, body.y, 0.0, 0.0
+        body.stay_x, body.stay_y = body.x, body.y
+        body.stay, body.stay_broad, body.stay_thin, body.stay_lands = 0.0, 0.0, 0.0, 0.0
     body.stay += dt
     if body.broadest > (_BROAD_M if legs else _BROAD_SHOES_M):
         body.stay_broad += dt
+    elif 0.0 < body.broadest < _THIN_M:
+        body.stay_thin += dt
+    body.stay_lands += (1.0 if body.a_since == body.seen else 0.0) + (1.0 if body.b_since == body.seen else 0.0)
 
 
 @njit(cache=True)
 def flickers(body: Any, legs: bool) -> bool:
-    """Whether it is furniture of which now this comes back, now that: too broad for who stays, or never a foot."""
+    """Whether it is furniture of which now this comes back, now that: no person looks so where he stays.
+
+    Where people show ``legs`` more is known of them.
+    """
     if body.robot or body.machine:
         return False
+    return bool(_is_thin(body, legs) or _lands(body, legs) or _is_broad(body, legs))
+
+
+@njit(cache=True)
+def _is_thin(body: Any, legs: bool) -> bool:
+    """Too thin for too much of the time, or never a foot."""
+    stays_s = _STAYS_S if legs or body.spacing < _FAR_M else _STAYS_FAR_S
+    thin = body.stay > stays_s and body.stay_thin > (_THIN_LEGS if legs else _THIN_SHOES) * body.stay
+    return bool(thin or (body.hits > _OFTEN and body.far < _PART_M))
+
+
+@njit(cache=True)
+def _lands(body: Any, legs: bool) -> bool:
+    """Its feet land too often."""
+    return bool(body.stay > _LANDS_S and body.stay_lands > (_LEGS_LAND if legs else _SHOES_LAND) * body.stay)
+
+
+@njit(cache=True)
+def _is_broad(body: Any, legs: bool) -> bool:
+    """Too broad too often."""
     if norm(body.x - body.x0, body.y - body.y0) > _PUSHED_M and not knows_feet(body):
         # It came by itself: a robot, maybe.
         return False
     stays, least, share = _STAYS_S, _SELDOM_S, _SELDOM
     if not legs and knows_feet(body):
         stays, least, share = _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN
-    broad = body.stay > stays and body.stay_broad > max(least, share * body.stay)
-    return bool(broad or (body.hits > _OFTEN and body.far < _PART_M))
+    return bool(body.stay > stays and body.stay_broad > max(least, share * body.stay))
 
 
 class Flickering:
@@ -64,7 +96,8 @@ class Flickering:
         """What was taken for the body (`state.BODY`) is furniture."""
         self.places.append((float(body["x"]), float(body["y"]), 0.5 * float(body["far"]) + _AROUND_M, _LEARNED_S))
         self._t = t
-        body["stay"] = body["stay_broad"] = 0.0
+        for note in ("stay", "stay_broad", "stay_thin", "stay_lands"):
+            body[note] = 0.0
 
     def step(self, view: Any, clusters: Any, bodies: Any, t: float) -> int:
         """Learn what of the clusters (m,) is a part of it as background; what is not moves to the front: how many."""
@@ -72,7 +105,11 @@ class Flickering:
         seen = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == 0)
         dt, self._t = t - self._t, t
         for index, (x, y, around, seconds) in enumerate(self.places):
-            if not (seen & (np.hypot(bodies["x"] - x, bodies["y"] - y) < around + _BESIDE_M)).any():
+            away = np.hypot(bodies["x"] - x, bodies["y"] - y)
+            # Who stays there and has been nowhere else is another part of it.
+            part = (away < around) & (np.hypot(bodies["x0"] - x, bodies["y0"] - y) < around)
+            part &= bodies["stay"] > _STAYS_S
+            if not (seen & ~part & (away < around + _BESIDE_M)).any():
                 kept &= np.hypot(clusters["x"] - x, clusters["y"] - y) > around
                 self.places[index] = (x, y, around, seconds - dt)
         self.places = [place for place in self.places if place[3] > 0.0]

@@ -20,7 +20,7 @@ _LATELY = ("look", "look_n", "pace", "pace_n", "girth", "girth_n", "sole", "sole
 #: What has nothing to do with whose foot a cluster is.
 BESIDES = (
     *("told_x", "told_y", "told_at", "clear", "lone", "lone_x", "lone_y", "rest_x", "rest_y", "rest_at", "pushed"),
-    *("stay_x", "stay_y", "stay", "stay_broad", "broadest"),
+    *("stay_x", "stay_y", "stay", "stay_broad", "stay_thin", "stay_lands", "broadest", "spacing"),
     *("quality", "single", "still", "older", "odd", "suspected", *_LATELY),
 )
 _NAMES = BODY.names or ()

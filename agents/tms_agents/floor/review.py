@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import misled
 from tms_agents.floor.build import SHOES
-from tms_agents.floor.flickering import flickers, note_breadth
+from tms_agents.floor.flickering import flickers, note_stay
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
 from tms_agents.floor.lone import count_lone, has_come, has_walked
 from tms_agents.floor.masks import distance
@@ -210,7 +210,7 @@ def review(
         if unseen == 0.0:
             if norm(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
                 body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
-            note_breadth(body, dt, legs)
+            note_stay(body, dt, legs)
         if not body.confirmed:
             actions[b] = _new(bodies, b, t, sight, waits, learned)
         elif unseen == 0.0:

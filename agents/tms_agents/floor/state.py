@@ -69,8 +69,9 @@ CONCEALED, SEATED = 1, 2
 #: who it is (look, pace, girth, sole), and of the one whose name it has (own, own_pace, own_girth, own_sole); sure is
 #: how likely that name is. Further: the number of its `FOOTPRINT` (0: none), for how long (s) and where it has stood on
 #: one foot alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it
-#: has stayed (rest), where, more widely, and for how long it was seen there (stay, s), broader than feet (stay_broad,
-#: s), how broad (m) the broader of what was seen of it last is (broadest), how wide the legs are (m, 0: unknown),
+#: has stayed (rest), where, more widely, and for how long it was seen there (stay, s), broader and thinner than feet
+#: (stay_broad, stay_thin, s), how often feet landed there (stay_lands), how broad (m) the broader of what was seen of
+#: it last is (broadest), and how far apart beams are there (spacing), how wide the legs are (m, 0: unknown),
 #: whether what is seen of it is no foot, and why (odd, `prints.UNLIKE`), the line on which the shoe last seen from its
 #: side lay (ex, ey), and when (e_at), in how many scans both feet had been seen (both) when it was last found to be
 #: nowhere (doubted), until when it stays where it was put back (held, s), and when somebody began to be seen, far from
@@ -137,7 +138,10 @@ BODY = np.dtype(
         ("stay_y", "f8"),
         ("stay", "f8"),
         ("stay_broad", "f8"),
+        ("stay_thin", "f8"),
+        ("stay_lands", "f8"),
         ("broadest", "f8"),
+        ("spacing", "f8"),
         ("pushed", "f8"),
         ("quality", "f8"),
         ("single", "f8"),

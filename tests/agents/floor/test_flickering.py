@@ -25,6 +25,7 @@ OPEN = (np.full(101, 8.0), np.full(101, BACKGROUND, np.int8), np.full(101, 8.0),
 LEGS, SHOES = {"own_girth_n": 100}, {"own_sole_n": 20}
 
 
+@pytest.mark.timeout(600)  # the estimator compiles where it never ran before
 @pytest.mark.parametrize(("seed", "echoes"), [(2, 0.3), (0, 0.4), (2, 0.4), (0, 0.5), (1, 0.5), (3, 0.5)])
 def test_a_black_cabinet_that_somebody_brings_is_nobody(seed: int, echoes: float) -> None:
     """Each of its beams comes back so often. When he has gone pieces of it are told as feet, but not for long."""
@@ -42,10 +43,19 @@ def test_a_black_cabinet_that_somebody_brings_is_nobody(seed: int, echoes: float
     assert told < 0.5
 
 
-def stays(broad: int, seconds: float, *, legs: bool = True, moves_m: float = 0.0, **fields: float) -> Tracks:
-    """Somebody shows both feet for so long, in ``broad`` of ten scans as something 0.4 m broad.
+def stays(
+    broad: int,
+    seconds: float,
+    *,
+    legs: bool = True,
+    moves_m: float = 0.0,
+    thin: int = 0,
+    lands: int = 0,
+    **fields: float,
+) -> Tracks:
+    """Somebody shows both feet for so long, in ``broad`` of ten scans as something 0.4 m broad, in ``thin`` 3 cm.
 
-    Every three seconds he is ``moves_m`` farther.
+    Every three seconds he is ``moves_m`` farther, and in ``lands`` of ten scans a foot has landed.
     """
     scene = Scene(region=[(0.0, -4.0), (9.0, -4.0), (9.0, 4.0), (0.0, 4.0)], gates=[])
     one = Tracks(Association(3, 4), FloorSettings(), scene)
@@ -70,7 +80,9 @@ def stays(broad: int, seconds: float, *, legs: bool = True, moves_m: float = 0.0
         for name in ("x", "ax", "bx"):
             body[name] += moves_m * (scan % 30 == 0)
         body["seen"] = body["a_seen"] = body["b_seen"] = t
-        body["broadest"] = 0.4 if scan % 10 < broad else 0.1
+        body["broadest"] = 0.4 if scan % 10 < broad else 0.03 if scan % 10 >= 10 - thin else 0.1
+        if scan % 10 < lands:
+            body["a_since"] = t
         one.review(t, 0.1, OPEN, lambda: 9, lambda _: False, lambda _: False, learned=True, legs=legs)
     return one
 
@@ -105,6 +117,42 @@ def stays(broad: int, seconds: float, *, legs: bool = True, moves_m: float = 0.0
 )
 def test_who_stays_is_hardly_ever_broad(broad: int, seconds: float, given: dict[str, float], found: bool) -> None:
     assert bool(stays(broad, seconds, **given).flickering.places) == found  # type: ignore[arg-type]
+
+
+NEAR, FAR = {"legs": False, "spacing": 0.01}, {"legs": False, "spacing": 0.03}
+
+
+@pytest.mark.parametrize(
+    ("thin", "lands", "seconds", "given", "found"),
+    [
+        (5, 0, 7.0, {}, True),
+        (3, 0, 30.0, {}, False),
+        (5, 0, 5.0, {}, False),
+        (5, 0, 7.0, {"x0": 1.0}, True),
+        (5, 0, 30.0, {"moves_m": 0.7}, False),
+        (8, 0, 7.0, NEAR, True),
+        (5, 0, 30.0, NEAR, False),
+        (8, 0, 20.0, FAR, False),
+        (8, 0, 27.0, FAR, True),
+        (0, 5, 9.0, {}, True),
+        (0, 4, 30.0, {}, False),
+        (0, 5, 7.0, {}, False),
+        (0, 4, 9.0, NEAR, True),
+        (0, 3, 30.0, NEAR, False),
+        (0, 5, 9.0, {"machine": 1}, False),
+    ],
+    ids=[
+        *("thin half of the time", "a third of it", "not for long", "wherever he came from", "he walks"),
+        *("shoes nearby, most of the time", "half of it", "far away not for long", "far away for long"),
+        *("lands five times a second", "four times, legs", "not for long, too", "four times, shoes", "three times"),
+        "a robot of known size",
+    ],
+)
+def test_who_stays_is_hardly_ever_thin_and_steps_seldom(
+    thin: int, lands: int, seconds: float, given: dict[str, float], found: bool
+) -> None:
+    one = stays(0, seconds, thin=thin, lands=lands, **given)  # type: ignore[arg-type]
+    assert bool(one.flickering.places) == found
 
 
 def view(ranges: np.ndarray) -> SimpleNamespace:
@@ -156,6 +204,19 @@ def test_not_while_somebody_is_near() -> None:
     assert one.places == before
     bodies["stale"][0] = 1
     assert one.step(view(ranges), found, bodies, NOW + 6.0) == 1
+
+
+@pytest.mark.parametrize(("began", "seconds", "learned"), [(2.1, 7.0, True), (0.5, 7.0, False), (2.1, 5.0, False)])
+def test_another_part_of_it_is_not_somebody(began: float, seconds: float, learned: bool) -> None:
+    """Who stays there, and began there, is no reason not to learn it; who came, or is there since lately, is."""
+    one, ranges = Flickering(), np.full(40, 4.0)
+    ranges[10:13] = 2.0
+    bodies = empty(BODY, 2)
+    for name, value in {"used": 1, "confirmed": 1, "x": 2.2, "x0": began, "stay": seconds}.items():
+        bodies[name][0] = value
+    bodies["x"][1], bodies["far"][1] = 2.0, 0.5
+    one.found(bodies[1], NOW)
+    assert one.step(view(ranges), clusters(1.5, 2.0), bodies, NOW + 1.0) == (1 if learned else 2)
 
 
 def test_who_is_told_at_it_and_was_never_known_vanishes() -> None:
