@@ -20,8 +20,8 @@ _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
 #: Nor does he look so thin (m) for so much of the time, where people show legs and where they may show shoes; of shoes
 #: that far away that beams are farther apart than this (m) hardly more comes back, but not for so long (s).
 _THIN_M, _THIN_LEGS, _THIN_SHOES = 0.05, 0.4, 0.7
-_FAR_M, _STAYS_FAR_S = 0.022, 25.0
-#: Nobody's feet land so often (1/s) in so long (s).
+_FAR_M, _STAYS_FAR_S = 0.02, 25.0
+#: Nobody's feet land so often (1/s) in so long (s), seen from as far; nearby each scan sees a leg anew that swings.
 _LANDS_S, _LEGS_LAND, _SHOES_LAND = 8.0, 4.5, 3.5
 #: What is pushed goes so far (m) at most.
 _PUSHED_M = 1.5
@@ -69,7 +69,8 @@ def _is_thin(body: Any, legs: bool) -> bool:
 @njit(cache=True)
 def _lands(body: Any, legs: bool) -> bool:
     """Its feet land too often."""
-    return bool(body.stay > _LANDS_S and body.stay_lands > (_LEGS_LAND if legs else _SHOES_LAND) * body.stay)
+    often = body.stay_lands > (_LEGS_LAND if legs else _SHOES_LAND) * body.stay
+    return bool(body.stay > _LANDS_S and often and body.spacing > _FAR_M)
 
 
 @njit(cache=True)
