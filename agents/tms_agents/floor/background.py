@@ -26,7 +26,7 @@ _SILENT = 0.7
 
 
 @njit(cache=True)
-def longest_of(centre: Array, weight: Array, least: Array, i: int) -> float:
+def _longest_of(centre: Array, weight: Array, least: Array, i: int) -> float:
     """The farthest component of beam i that is believed, m; 0 if there is none."""
     far = 0.0
     for j in range(centre.shape[1]):
@@ -61,12 +61,11 @@ def _classify(
     """
     n, k = centre.shape
     for i in range(n):
-        far = longest_of(centre, weight, least, i)
-        if far == 0.0:
-            far = np.inf
-        longest[i] = far
-        steady[i] = far if empty[i] < _SILENT else np.inf
+        far = _longest_of(centre, weight, least, i)
+        longest[i] = far if far > 0.0 else np.inf
+        steady[i] = longest[i] if empty[i] < _SILENT else np.inf
         back[i] = False
+    for i in range(n):
         r = ranges[i]
         if np.isnan(r):
             states[i] = UNKNOWN
@@ -94,13 +93,12 @@ def _classify(
             for side in (-1, 1):
                 # A slanting wall goes on where something nearer ends.
                 if 0 <= i + 2 * side < n:
-                    one = longest_of(centre, weight, least, i + side)
-                    two = longest_of(centre, weight, least, i + 2 * side)
+                    one, two = longest[i + side], longest[i + 2 * side]
                     bend = abs(one - two)
-                    if one > 0.0 and bend < 0.3 and abs(r - 2.0 * one + two) < threshold + 0.6 * bend:
+                    if bend < 0.3 and abs(r - 2.0 * one + two) < threshold + 0.6 * bend:
                         state = BACKGROUND
         if state == UNKNOWN:
-            if r < far:
+            if r < longest[i]:
                 # A slanting wall: between what the beams on both sides see there is nothing new.
                 slanting = highest - lowest < 0.25 and lowest < r < highest
                 state = BACKGROUND if slanting else FOREGROUND
@@ -123,8 +121,9 @@ def _its_own(
 ) -> bool:
     """Whether the range r of beam i is near a component of its own that has not gone: so it is mostly."""
     for j in range(centre.shape[1]):
-        near = abs(r - centre[i, j]) <= max(threshold, sigmas * sigma[i, j])
-        if weight[i, j] > least[i] and near and not missing[i, j] > GONE_S:
+        gap = abs(r - centre[i, j])
+        near = gap <= threshold or gap <= sigmas * sigma[i, j]
+        if near and weight[i, j] > least[i] and not missing[i, j] > GONE_S:
             return True
     return False
 
