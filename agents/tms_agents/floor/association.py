@@ -222,7 +222,7 @@ class Association:
         # All fields are as long as an integer: what is the same to the last bit is found by these.
         self._raw = self._hypotheses.view(np.int64).reshape(_KEPT, most, -1)
         self._spare_raw = self._spare.view(np.int64).reshape(_KEPT, most, -1)
-        self._before, self._decided = np.zeros_like(self._raw[0]), np.zeros(most, np.bool_)
+        self._before, self._decided = np.zeros_like(self._raw[:1]), np.zeros(most, np.bool_)
         self._beliefs, self._spare_beliefs = np.zeros((_KEPT, most, most)), np.zeros((_KEPT, most, most))
         self._beliefs[:] = np.eye(most)
         self._nobodys_at, self._spare_nobodys_at = np.full((_KEPT, prints), -1e9), np.full((_KEPT, prints), -1e9)
@@ -276,7 +276,7 @@ class Association:
 
     def mark(self) -> None:
         """From now on until `settle` what is known of the best hypothesis may change."""
-        self._before[:] = self._raw[0]
+        self._before[:] = self._raw[:1]
         self._decided[:] = False
 
     def decide(self, *indices: int) -> None:
@@ -285,7 +285,7 @@ class Association:
 
     def decide_changed(self) -> None:
         """The same of everybody who is another one since `mark`."""
-        self._decided |= (self._before != self._raw[0])[:, FEET].any(axis=1)
+        self._decided |= (self._before[0] != self._raw[0])[:, FEET].any(axis=1)
 
     def settle(self) -> None:
         """What has changed since `mark` is so in all hypotheses in which it was as in the best."""
@@ -352,7 +352,7 @@ class Association:
         if index >= 0:
             put(self.hypotheses, index, prints, i, t)
             # Nobody was there in any hypothesis: what is found of the new one is so in all.
-            self._before[index] = self._raw[0][index]
+            self._before[0, index] = self._raw[0, index]
         return index
 
     def _free(self) -> int:

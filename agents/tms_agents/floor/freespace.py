@@ -302,7 +302,7 @@ def guard(ranges: Array, states: NDArray[np.int8], claimed: NDArray[np.bool_]) -
             claimed[i] = True
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _belongs(ranges: Array, states: NDArray[np.int8], i: int, edge: int) -> bool:
     """Whether beam i, beside a thing that ends at beam ``edge``, may show a bit of it."""
     if states[i] == BEYOND:

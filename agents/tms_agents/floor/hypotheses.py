@@ -66,16 +66,17 @@ def same_places(one: Any, two: Any, of: Integers) -> bool:
 def first_like(raw: Integers, fields: Integers, h: int, row: int) -> int:
     """The first hypothesis in which the body ``row`` is exactly as in hypothesis h, in these fields of ``raw``."""
     g = 0
-    while g < h and not _equal(raw[g, row], raw[h, row], fields):
+    while g < h and not _equal(raw, g, raw, h, row, fields):
         g += 1
     return g
 
 
 @njit(cache=True)
-def _equal(one: Integers, two: Integers, fields: Integers) -> bool:
-    """Whether two bodies, as integers, are the same in these fields."""
+def _equal(one: Integers, g: int, two: Integers, h: int, row: int, fields: Integers) -> bool:
+    """Whether the body ``row`` is the same in these fields of one[g] and of two[h], both as integers."""
+    # No views of the rows: to count who uses them would take longer than to look.
     k = 0
-    while k < fields.size and one[fields[k]] == two[fields[k]]:
+    while k < fields.size and one[g, row, fields[k]] == two[h, row, fields[k]]:
         k += 1
     return k == fields.size
 
@@ -113,8 +114,8 @@ def settle(
 ) -> int:
     """What became of bodies of the best hypothesis holds in all in which they were the same: how many there are.
 
-    Hypotheses (kept, n), as integers ``raw`` (kept, n, fields); bodies of the best as they were ``before`` (n, fields).
-    Hypotheses in which one is another that is ``decided`` (n,) are dropped; ``scores``, ``beliefs`` and
+    Hypotheses (kept, n), as integers ``raw`` (kept, n, fields); bodies of the best as they were ``before``
+    (1, n, fields). Hypotheses in which one is another that is ``decided`` (n,) are dropped; ``scores``, ``beliefs`` and
     ``nobodys_at`` move along.
     """
     n = hypotheses.shape[1]
@@ -122,7 +123,7 @@ def settle(
     for h in range(1, count):
         good = True
         for b in range(n):
-            good &= not decided[b] or _equal(raw[h, b], before[b], FEET)
+            good &= not decided[b] or _equal(raw, h, before, 0, b, FEET)
         if not good:
             continue
         if kept < h:
@@ -130,7 +131,7 @@ def settle(
             scores[kept] = scores[h]
             nobodys_at[kept] = nobodys_at[h]
         for b in range(n):
-            if hypotheses[kept, b].used and _equal(raw[kept, b], before[b], FEET):
+            if hypotheses[kept, b].used and _equal(raw, kept, before, 0, b, FEET):
                 for field in FOUND:
                     raw[kept, b, field] = raw[0, b, field]
         kept += 1

@@ -188,10 +188,13 @@ def feet_by(
 ) -> None:
     """As `feet`, by other numbers than those in use."""
     body = bodies[row]
+    reach = _REACH_M + 1.5 * np.sqrt(body.pp)
     for i in range(clusters.size):
-        cost[i, :] = UNLIKELY
-        if free[i]:
-            _foot(legs, shoes, clusters[i], of[i], marks[i], prints, body, row, t, cost[i])
+        c = clusters[i]
+        cost[i, 0] = cost[i, 1] = UNLIKELY
+        # What is its own of one that has a footprint is known (`footprints`).
+        if free[i] and not body.footprint and norm(c.x - body.x, c.y - body.y) <= reach:
+            _foot(legs, shoes, c, of[i], marks[i], prints, body, row, t, cost[i])
     for i in range(clusters.size):
         if free[i] and together(body, clusters, i, t):
             # Both feet in one cluster: whatever else is near is not a foot of this body.
@@ -216,12 +219,7 @@ def _foot(
     cost: Array,
 ) -> None:
     """Lower ``cost`` (2,) to that of the cluster c, on ``print_`` (-1: none), being the first and the second foot."""
-    if body.footprint:
-        # What is its own is known (`footprints`).
-        return
     away = norm(c.x - body.x, c.y - body.y)
-    if away > _REACH_M + 1.5 * np.sqrt(body.pp):
-        return
     q = prints[print_] if print_ >= 0 else prints[0]
     age = t - q.first if print_ >= 0 else 0.0
     if body.stale and age > FRESH_S and not waits(body, c):
