@@ -109,11 +109,20 @@ class Absent:
 
     def rises(self, bodies: Any, body: Any, scattered: Array) -> int | None:
         """Which of the ``bodies`` (n,), who seemed to sit down, is this new one: he went on where nobody saw it."""
+        return self._of(bodies, SEATED, body, scattered, _PASSES_S)
+
+    def comes_out(self, bodies: Any, body: Any, scattered: Array) -> int | None:
+        """The same of those who seemed to be hidden: he has walked on behind others."""
+        return self._of(bodies, CONCEALED, body, scattered, _WAIT_S)
+
+    def _of(self, bodies: Any, stale: int, body: Any, scattered: Array, within_s: float) -> int | None:
+        """Which of the ``bodies`` (n,) that are ``stale`` in this way the new one most probably is, or None."""
         if not self.inside(body):
             return None
-        seated = np.flatnonzero((bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == SEATED))
-        index = self._likeliest([bodies[i] for i in seated], body, scattered, _PASSES_S)
-        return None if index is None else int(seated[index])
+        there = (bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["robot"] == 0)
+        those = np.flatnonzero(there & (bodies["stale"] == stale))
+        index = self._likeliest([bodies[i] for i in those], body, scattered, within_s)
+        return None if index is None else int(those[index])
 
     def inside(self, body: Any) -> bool:
         """Whether the new one began too far from the doors, where they are known, to have come in."""

@@ -286,14 +286,7 @@ class Tracks:
         if robot and body["from_furniture"] == 0 and body["pushed"] < _ALONE:
             # It came by itself; whoever is beside it later does not push it.
             body["from_furniture"] = -1
-        if missing is None and not is_footless(body):
-            missing = self.absent.rises(self.bodies, body, self._association.scattered)
-        old = None
-        if missing is not None:
-            self._association.decide(missing)
-            old = self.bodies[missing]
-        elif not is_footless(body):
-            old = self.absent.find(body, self._association.scattered)
+        old = self._was(body, missing)
         if old is not None:
             body["confirmed"], body["robot"] = 1, old["robot"]
             self._go_on(index, old)
@@ -307,6 +300,20 @@ class Tracks:
             suspect(self.bodies, index, t)
         label, xy, cov = self._tell(index, t)
         return [Appeared(t, label, "mover", xy, cov, robot, float(body["first"]), (), float(body["width"]))]
+
+    def _was(self, body: Any, missing: int | None) -> Any:
+        """Who of those not seen now the new one is: who is ``missing``, if anybody is; None: somebody new."""
+        if missing is None and not is_footless(body):
+            scattered = self._association.scattered
+            missing = self.absent.rises(self.bodies, body, scattered)
+            if missing is None and (old := self.absent.find(body, scattered)) is not None:
+                return old
+            if missing is None:
+                missing = self.absent.comes_out(self.bodies, body, scattered)
+        if missing is None:
+            return None
+        self._association.decide(missing)
+        return self.bodies[missing]
 
     def _is_pushed(self, body: Any, missing: int | None, legs: bool) -> bool:
         """Whether it is broader than a foot, began where nobody comes in, and somebody goes beside it.

@@ -177,6 +177,36 @@ def test_without_doors_who_sits_stays_where_he_is() -> None:
     assert Absent(Area([]), Area([ROOM])).rises(bodies, person(5.0, 4.0, first=12.0), expected()) is None
 
 
+@pytest.mark.parametrize(
+    ("fields", "same"),
+    [
+        ({}, True),
+        ({"robot": 1}, False),
+        ({"stale": SEATED, "seen": 3.0}, False),
+        ({"stale": 0}, False),
+        ({"x": 0.5}, False),
+        ({"own": 5.0}, False),
+    ],
+    ids=["hidden", "a robot", "sat down long ago", "seen", "too far", "another"],
+)
+def test_who_begins_in_the_middle_of_the_room_is_who_was_hidden(
+    absent: Absent, fields: dict[str, float], same: bool
+) -> None:
+    bodies = empty(BODY, 3)
+    bodies[1] = person(3.0, 4.0)
+    bodies["stale"] = CONCEALED
+    for name, value in fields.items():
+        bodies[name][1] = value
+    assert absent.comes_out(bodies, person(7.0, 4.0, first=14.0), expected()) == (1 if same else None)
+
+
+def test_who_comes_in_by_the_door_is_nobody_who_is_hidden(absent: Absent) -> None:
+    bodies = empty(BODY, 1)
+    bodies[0] = person(2.0, 0.0)
+    bodies["stale"] = CONCEALED
+    assert absent.comes_out(bodies, person(0.8, 0.0, first=14.0), expected()) is None
+
+
 def test_of_two_the_one_who_looks_like_it(absent: Absent) -> None:
     absent.keep(person(4.0, 4.0, label=1, own=7.3))
     absent.keep(person(4.2, 4.0, label=2, own=7.1))
