@@ -37,8 +37,9 @@ _CAME_M, _CAME_BOTH = 0.5, 10
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
 #: Two feet seen (within s) so near each other (m) are one thing, of which now this part is met, now that. Not what is
-#: as wide as no leg of his, it may be both; nor one print, now taken for this foot, now for that.
-_BOTH_SEEN_S, _ONE_M = 1.0, 0.08
+#: as wide as no leg of his, it may be both; nor one print, now taken for this foot, now for that: a leg hides the
+#: other. But two shoes are not so near each other (m).
+_BOTH_SEEN_S, _ONE_M, _ONE_PRINT_M = 1.0, 0.08, 0.04
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
 _STOOD_S = 20.0
 #: Two legs that are one thing to the laser are wider (m) than one.
@@ -71,7 +72,8 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
         body.lone += dt * _FASTER
     elif not behind or body.odd == ALONE:
         faster = _FASTER if body.odd and not behind else 1.0
-        body.lone += dt * (faster if body.odd == ALONE or _may_have_gone(bodies, b) else _IN_SIGHT)
+        gone = body.odd == ALONE or _is_one_print(body, t) or _may_have_gone(bodies, b)
+        body.lone += dt * (faster if gone else _IN_SIGHT)
     elif norm(foot_x - x, foot_y - y) > _STRIDE_M:
         body.lone += dt / _SLOWER
 
@@ -128,7 +130,7 @@ def _is_lone(body: Any, t: float) -> bool:
     apart = norm(body.ax - body.bx, body.ay - body.by)
     a, b = t - body.a_seen, t - body.b_seen
     parts = body.a_print != body.b_print and apart < _ONE_M and body.odd != UNLIKE
-    if max(a, b) < _BOTH_SEEN_S and parts:
+    if (max(a, b) < _BOTH_SEEN_S and parts) or _is_one_print(body, t):
         return True
     since = body.a_since if a < b else body.b_since
     # What was met beside one who stands may have been the foot of somebody who passes.
@@ -142,6 +144,13 @@ def _is_lone(body: Any, t: float) -> bool:
     if body.still > _STILL_S or sliver:
         return True
     return bool(max(a, b) > 1.0 and t - since > 1.0)
+
+
+@njit(cache=True)
+def _is_one_print(body: Any, t: float) -> bool:
+    """Whether both shoes were seen on one print of late, at one place."""
+    both = max(t - body.a_seen, t - body.b_seen) < _BOTH_SEEN_S and body.a_print == body.b_print
+    return bool(both and body.shoe >= SHOES and norm(body.ax - body.bx, body.ay - body.by) < _ONE_PRINT_M)
 
 
 @njit(cache=True)

@@ -78,6 +78,12 @@ def test_one_print_taken_for_either_foot_in_turn_is_not_two_parts_of_a_thing() -
     assert counted(b_print=0, **stands) == 0.0
 
 
+@pytest.mark.parametrize(("apart", "shoe", "thing"), [(0.02, 1.0, True), (0.06, 1.0, False), (0.02, 0.0, False)])
+def test_both_shoes_at_one_place_are_a_thing(apart: float, shoe: float, thing: bool) -> None:
+    stands = {"by": apart, "b_seen": NOW - 0.2, "b_since": NOW - 9.0, "b_land": NOW - 9.0, "b_print": 0}
+    assert counted(shoe=shoe, **stands) == pytest.approx(1.0 if thing else 0.0)
+
+
 @pytest.mark.parametrize(("idle", "older"), [(1.5, 0.0), (20.0, 20.0)])
 def test_what_was_nobodys_for_a_moment_had_not_stood_there_before(idle: float, older: float) -> None:
     bodies, prints = empty(BODY, 1), empty(PRINT, 1)
