@@ -129,6 +129,17 @@ def test_who_crosses_a_mask_keeps_the_label() -> None:
     assert not estimator.labels()
 
 
+def test_who_walks_on_behind_a_shelf_keeps_the_label() -> None:
+    shelf = box(2.4, 1.6, 2.6, 0.3)
+    way = [(8.0, -0.6, 3.2), (10.0, 0.4, 3.2), (12.5, 2.4, 3.3), (15.5, 4.5, 2.5), (17.0, 4.6, 1.4), (19.0, 4.5, 0.6)]
+    gate = [(-0.3, 2.7), (0.3, 2.7), (0.3, 3.7), (-0.3, 3.7)]
+    scene = Scene(region=[(0, 0), (5, 0), (5, 4), (0, 4)], gates=[gate])
+    estimator, events = Room(walker(way), lambda t: WALLS + shelf).play(18.5, scene=scene)
+    (who,) = born(events, "mover")
+    assert [(one.id, one.stale) for one in estimator.labels()] == [(who.label, False)]
+    assert math.dist(estimator.labels()[0].xy, (4.5, 0.7)) < 0.4
+
+
 def test_two_who_cross_keep_their_labels() -> None:
     one = [(9.0, 4.8, 1.4), (15.0, 0.8, 1.4), (16.0, 0.8, 1.4)]
     two = [(9.0, 1.0, 3.6), (15.0, 3.6, 0.7), (16.0, 3.6, 0.7)]
