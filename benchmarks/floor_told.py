@@ -109,7 +109,7 @@ class Told(Association):
             self.explained(Scan(t, clusters, of, marks, prints, rows, cost, columns, sight))
         free = np.ones(count, np.bool_)
         adopt(self.bodies, rows, columns, clusters, of, marks, free, BLANK, prints, t, sight)
-        complete(self.bodies, rows, clusters, of, marks, free, BLANK, prints, t, sight, self.seats)
+        complete(self.bodies, clusters, of, marks, free, BLANK, prints, t, sight)
         scatter(self.bodies, clusters, of, marks, t, self.scattered)
         return ~free
 

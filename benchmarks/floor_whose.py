@@ -111,7 +111,7 @@ class _Situations(Told):
                 scan.marks[seen].copy(),
                 prints,
                 nobodys,
-                np.array([missed(self.bodies, rows[k : k + 1], scan.t, scan.sight, self.seats) for k in near]),
+                np.array([missed(self.bodies[rows[k]], scan.t, scan.sight, self.seats) for k in near]),
                 _allowed(clusters[seen], nobodys, theirs, least),
             )
         )

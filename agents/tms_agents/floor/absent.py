@@ -189,7 +189,9 @@ class Absent:
             if not lost:
                 continue
             late = [one for one in lost if t - one["seen"] > wait_s]
-            self._missed |= bool(late) and lost is self._bodies
+            if not late:
+                continue
+            self._missed |= lost is self._bodies
             events += [Vanished(t, int(one["label"]), float(one["seen"]), t) for one in late]
             lost[:] = [one for one in lost if t - one["seen"] <= wait_s]
         return events

@@ -66,18 +66,21 @@ def adopt_from(
     prints: Any,
     t: float,
     sight: Any,
+    seats: Any,
     pool: Any,
     seen: NDArray[np.int64],
+    misses: Array,
     last: NDArray[np.int64],
     pooled: int,
-) -> int:
+) -> tuple[int, float]:
     """As `adopt`, from the bodies of the ``parent`` into ``bodies`` (n,), without doing the same twice in a scan.
 
     Whoever was the same (``first`` (n,): in that hypothesis) and has taken the same feet before is copied from the
-    ``pool``, in which so many are ``pooled``: how many are now. ``seen`` (pool, 4) says which those are: first, both
-    feet, and the one before of the same row; ``last`` (n,) the last of each row.
+    ``pool``, in which so many are ``pooled``: how many are now, and what `missed`, which takes ``seats``, finds of all.
+    ``seen`` (pool, 4) says which those are: first, both feet, and the one before of the same row; ``misses`` (pool,)
+    what it found of each; ``last`` (n,) the last of each row.
     """
-    feet = _feet_of(columns, rows.size, free)
+    feet, unseen = _feet_of(columns, rows.size, free), 0.0
     for column in range(rows.size):
         row, a, b = rows[column], feet[2 * column], feet[2 * column + 1]
         found = last[row]
@@ -85,15 +88,18 @@ def adopt_from(
             found = seen[found, 3]
         if found >= 0:
             bodies[row] = pool[found]
+            unseen += misses[found]
             continue
         bodies[row] = parent[row]
         _take(bodies[row], a, b, clusters, of, marks, blank, prints, t, sight)
+        miss = missed(bodies[row], t, sight, seats)
+        unseen += miss
         if pooled < pool.size:
-            pool[pooled] = bodies[row]
+            pool[pooled], misses[pooled] = bodies[row], miss
             seen[pooled, 0], seen[pooled, 1], seen[pooled, 2], seen[pooled, 3] = first[row], a, b, last[row]
             last[row] = pooled
             pooled += 1
-    return pooled
+    return pooled, unseen
 
 
 @njit(cache=True)
@@ -149,7 +155,6 @@ def _take(
 @njit(cache=True)
 def complete(
     bodies: Any,
-    believed: NDArray[np.int64],
     clusters: Any,
     of: NDArray[np.int64],
     marks: Array,
@@ -158,12 +163,8 @@ def complete(
     prints: Any,
     t: float,
     sight: Any,
-    seats: Any,
-) -> float:
-    """What the movers that are ``believed`` (k,) have left goes to those who are not yet, and then begins new ones.
-
-    The negative log likelihood of not having seen those in view; ``seats`` as `missed` takes them.
-    """
+) -> None:
+    """What the movers that are believed have left goes to those who are not yet, and then begins new ones."""
     m = clusters.size
     scratch = np.empty(bodies.size, np.int64)
     k = chosen(bodies, 0, scratch)
@@ -191,9 +192,7 @@ def complete(
                 if _pushed(c, bodies, t):
                     bodies[b].from_furniture = 1
                 break
-    unseen = missed(bodies, believed, t, sight, seats)
     expect(bodies, t, sight)
-    return float(unseen)
 
 
 @njit(cache=True)

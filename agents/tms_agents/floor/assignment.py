@@ -109,7 +109,8 @@ def reassign(cost: Array, of_row: Integers, row: int, barred: int, most: float, 
     best, lowest = _cheapest(cost, w, row, barred)
     if lowest - u[row] > most:
         return np.inf
-    other[:] = of_row
+    for i in range(of_row.size):
+        other[i] = of_row[i]
     if of_column[best] < 0 and v[freed] == 0.0:
         other[row] = best
         return _total(cost, other)
@@ -127,7 +128,9 @@ def reassign(cost: Array, of_row: Integers, row: int, barred: int, most: float, 
                 path[freed] = _NOBODY
                 break
             for j in range(cost.shape[1]):
-                many = _approach(j, _NOBODY, least - v[j], w, many)
+                # From another column that nobody has, nothing is nearer than from this one.
+                if of_column[j] != _NOBODY:
+                    many = _approach(j, _NOBODY, least - v[j], w, many)
         best, least = _nearest(w, many, False)
         w.reached[best] = True
         i = of_column[best]

@@ -68,20 +68,33 @@ def _advance(
     n, m = hypotheses.shape[1], clusters.size
     most = count * (m + 1)
     child_score, child_parent, child_columns = np.empty(most), np.empty(most, np.int64), np.full((most, m), -1)
-    first, alike = np.empty((count, n), np.int64), np.empty((count, n), np.int64)
+    first, alike, top = np.empty((count, n), np.int64), np.empty((count, n), np.int64), 0
     for h in range(count):
         predict(hypotheses[h], t)
         for b in range(n):
             if hypotheses[h, b].used:
+                top = max(top, b + 1 if hypotheses[h, b].confirmed else 0)
                 g = first_like(raw, ALL, h, b)
                 first[h, b] = g
                 alike[h, b] = alike[g, b] if g < h else first_like(raw, FEET, h, b)
     children = _propose(
-        hypotheses, alike, scores, clusters, of, marks, prints, t, nobodys_at, child_score, child_parent, child_columns
+        hypotheses,
+        alike,
+        top,
+        scores,
+        clusters,
+        of,
+        marks,
+        prints,
+        t,
+        nobodys_at,
+        child_score,
+        child_parent,
+        child_columns,
     )
     rows, other_of, scratch = np.empty(n, np.int64), np.empty(n, np.int64), np.empty((2, n))
     owned, free = np.zeros((hypotheses.shape[0], max(m, 1)), np.bool_), np.ones(m, np.bool_)
-    seen, last = np.empty((pool.size, 4), np.int64), np.full(n, -1)
+    seen, misses, last = np.empty((pool.size, 4), np.int64), np.empty(pool.size), np.full(n, -1)
     order = np.argsort(child_score[:children])
     kept, pooled = 0, 0
     least = child_score[order[0]]
@@ -92,7 +105,7 @@ def _advance(
         copy(hypotheses[parent], beliefs[parent], bodies, spare_beliefs[kept], False)
         k = chosen(hypotheses[parent], 1, rows)
         free[:] = True
-        pooled = adopt_from(
+        pooled, unseen = adopt_from(
             hypotheses[parent],
             first[parent],
             bodies,
@@ -106,8 +119,10 @@ def _advance(
             prints,
             t,
             sight,
+            seats,
             pool,
             seen,
+            misses,
             last,
             pooled,
         )
@@ -115,11 +130,11 @@ def _advance(
         for i in range(m):
             if free[i] and of[i] >= 0:
                 spare_nobodys_at[kept, of[i]] = t
-        score = child_score[o] - least
-        score += complete(bodies, rows[:k], clusters, of, marks, free, blank, prints, t, sight, seats)
+        complete(bodies, clusters, of, marks, free, blank, prints, t, sight)
+        score = child_score[o] - least + unseen
         known_already = False
         for j in range(kept):
-            if same_places(spare[j], bodies, other_of):
+            if same_places(spare[j], bodies, top, other_of):
                 worse = score - scores[j]
                 unite(spare[j], spare_beliefs[j], bodies, spare_beliefs[kept], other_of, worse, scattered, scratch)
                 known_already = True
@@ -146,6 +161,7 @@ def _advance(
 def _propose(
     hypotheses: Any,
     alike: NDArray[np.int64],
+    top: int,
     scores: Array,
     clusters: Any,
     of: NDArray[np.int64],
@@ -160,15 +176,12 @@ def _propose(
     """How each hypothesis may go on: the best assignment, and the best in which one cluster is not who it is there.
 
     ``alike`` (count, n) is in which hypothesis each body was the same first, for `feet`: most people are the same in
-    all. Fills what children there are, their score, parent and columns; how many.
+    all. All who are believed are among the first ``top``. Fills what children there are, their score, parent and
+    columns; how many.
     """
     count, n, m = alike.shape[0], hypotheses.shape[1], clusters.size
     rows = np.empty(n, np.int64)
     everything, columns, other = np.ones(m, np.bool_), np.empty(m, np.int64), np.empty(m, np.int64)
-    top = 0
-    for h in range(count):
-        k = chosen(hypotheses[h], 1, rows)
-        top = max(top, rows[k - 1] + 1 if k else 0)
     told = np.empty((count, top, m, 2))
     table, solved = np.empty(m * (2 * top + m)), work(m, 2 * top + m)
     spans = np.empty(m)
@@ -187,7 +200,8 @@ def _propose(
             like = alike[h, row]
             if like == h:
                 feet(clusters, of, marks, everything, prints, bodies, row, t, told[h, row])
-            cost[:, 2 * column : 2 * column + 2] = told[like, row]
+            for i in range(m):
+                cost[i, 2 * column], cost[i, 2 * column + 1] = told[like, row, i, 0], told[like, row, i, 1]
         nobodys(clusters, of, prints, bodies, rows[:k], spans, t, cost[:, 2 * k :])
         known(clusters, bodies, t, cost[:, 2 * k :])
         goes_on(clusters, of, prints, bodies, rows[:k], nobodys_at[h], t, cost[:, 2 * k :])

@@ -16,7 +16,7 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.furniture import Furniture, Piece
 from tms_agents.floor.masks import Area
 from tms_agents.floor.outline import search
-from tms_agents.floor.pursuit import SAME_M, goes, is_near, own, pursue, wide
+from tms_agents.floor.pursuit import SAME_M, bodiless, goes, is_near, own, pursue, wide
 from tms_agents.floor.robot_sizes import RobotSizes
 from tms_agents.floor.state import FOOTPRINT, empty, free_slot, pack, unpack
 from tms_agents.floor.view import View
@@ -79,10 +79,10 @@ class Footprints:
                 # What else might be a robot at this place is none.
                 near = np.hypot(self._all["x"] - q["x"], self._all["y"] - q["y"]) < SAME_M
                 self._all["used"][near & (self._all["sure"] == 0)] = 0
-        for index in np.flatnonzero(self._seen & (self._all["sure"] == 1) & (self._all["body"] < 0)).tolist():
+        index = -1
+        while (index := bodiless(self._all, self._seen, index + 1)) >= 0:
             q = self._all[index]
-            if q["used"]:
-                q["body"] = self._association.robot(self._body(q), q, index + 1, t)
+            q["body"] = self._association.robot(self._body(q), q, index + 1, t)
 
     def _body(self, q: Any) -> int:
         """The mover that is there and may be this robot, -1: none."""

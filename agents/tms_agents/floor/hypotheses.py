@@ -31,21 +31,23 @@ FOUND = np.array([index for index, field in enumerate(_NAMES) if field not in _L
 
 
 @njit(cache=True)
-def same_places(one: Any, two: Any, of: Integers) -> bool:
+def same_places(one: Any, two: Any, top: int, of: Integers) -> bool:
     """Whether two hypotheses put the movers at the same places on the same prints, whoever is who; ``of`` (n,) tells.
 
-    Then the way people go on cannot tell them apart: only how they look and walk can (`identity`).
+    All who are believed are among the first ``top``. Then the way people go on cannot tell the two apart: only how
+    they look and walk can (`identity`).
     """
-    for b in range(one.size):
+    of[top:] = -1
+    for b in range(top):
         p = one[b]
         of[b] = -1
         if not (p.used and p.confirmed):
             continue
         found = False
-        for o in range(two.size):
+        for o in range(top):
             # Most often it is the same one.
-            q = two[(b + o) % two.size]
-            of[b] = (b + o) % two.size
+            of[b] = b + o if b + o < top else b + o - top
+            q = two[of[b]]
             if not (q.used and q.confirmed):
                 continue
             near = _NEAR_M if p.a_print < 0 and p.b_print < 0 else 4.0 * _NEAR_M

@@ -22,7 +22,7 @@ from tms_agents.floor.build import (
     wears_shoes,
 )
 from tms_agents.floor.fitted import Legs, Shoes
-from tms_agents.floor.landing import landing
+from tms_agents.floor.landing import Way, lands, way
 from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import lay_before
 from tms_agents.floor.shine import unlike
@@ -189,12 +189,13 @@ def feet_by(
     """As `feet`, by other numbers than those in use."""
     body = bodies[row]
     reach = _REACH_M + 1.5 * np.sqrt(body.pp)
+    goes = way(body)
     for i in range(clusters.size):
         c = clusters[i]
         cost[i, 0] = cost[i, 1] = UNLIKELY
         # What is its own of one that has a footprint is known (`footprints`).
         if free[i] and not body.footprint and norm(c.x - body.x, c.y - body.y) <= reach:
-            _foot(legs, shoes, c, of[i], marks[i], prints, body, row, t, cost[i])
+            _foot(legs, shoes, goes, c, of[i], marks[i], prints, body, row, t, cost[i])
     for i in range(clusters.size):
         if free[i] and together(body, clusters, i, t):
             # Both feet in one cluster: whatever else is near is not a foot of this body.
@@ -209,6 +210,7 @@ def feet_by(
 def _foot(
     legs: Legs,
     shoes: Shoes,
+    goes: Way,
     c: Any,
     print_: int,
     marks: Array,
@@ -245,7 +247,7 @@ def _foot(
         cost[0] = 0.5 * (away / 0.3) ** 2 + (0.0 if c.cut or c.width > least else 6.0)
         return
     lately = print_ >= 0 and q.whose == body.label and t - q.owned < _LATELY_S
-    speed = norm(body.vx, body.vy)
+    speed = goes.speed
     shod = body.shoe >= SHOES
     along, aside = (shoes.along_m, shoes.aside_m) if shod else (legs.along_m, legs.aside_m)
     base = _apart(c.x - body.x, c.y - body.y, body, speed, along, aside)
@@ -295,7 +297,7 @@ def _foot(
             value += broad
         step = anywhere
         if shod:
-            step = landing(body, c, ox, oy, seen, landed, t - age)
+            step = lands(body, goes, c, ox, oy, seen, landed, t - age)
         elif gap < 0.22 and not left:
             # Seen just now, it cannot be far, unless it was something that was left behind.
             step += legs.seen + 0.5 * (max(0.0, np.sqrt(off) - 0.15 - 3.0 * gap) / legs.seen_m) ** 2

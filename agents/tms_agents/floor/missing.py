@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tms_agents.floor.freespace import FREE, HIDDEN, UNSEEN, WALLED, beam_of, clear
 from tms_agents.floor.masks import distance
@@ -24,24 +23,21 @@ _AHEAD_M, _LEAVES, _SWINGS_S = 0.3, 0.5, 0.6
 
 
 @njit(cache=True)
-def missed(bodies: Any, rows: NDArray[np.int64], t: float, sight: Any, seats: Any) -> float:
-    """Negative log likelihood of not having seen those movers ``rows`` (k,), or a leg of theirs, that were in view.
+def missed(body: Any, t: float, sight: Any, seats: Any) -> float:
+    """Negative log likelihood of not having seen a mover, or a leg of it, that was in view.
 
     Less near ``seats``, as `masks.joined` gives them.
     """
     ranges, states, longest, pose, first, step = sight
-    total = 0.0
-    for b in rows:
-        body = bodies[b]
-        waits = body.seen < t and not body.stale and t - body.seen < 1.0
-        if waits and clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
-            total += _SITS if _may_sit(body, seats) else _MISS
-        elif body.seen == t and _limps(body, t):
-            x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
-            x, y = 2.0 * body.x - x, 2.0 * body.y - y
-            if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
-                total += _LIMP
-    return total
+    if body.seen < t and not body.stale and t - body.seen < 1.0:
+        if clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
+            return _SITS if _may_sit(body, seats) else _MISS
+    elif body.seen == t and _limps(body, t):
+        x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
+        x, y = 2.0 * body.x - x, 2.0 * body.y - y
+        if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
+            return _LIMP
+    return 0.0
 
 
 @njit(cache=True)

@@ -13,6 +13,7 @@ from tms_agents.floor.candidates import candidates, near_movers
 from tms_agents.floor.events import Appeared, Candidates, FloorEvent, FloorLabel, Vanished
 from tms_agents.floor.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.ripening import WAITS, find_ripe
+from tms_agents.floor.robots import has_robot
 from tms_agents.floor.settings import FloorSettings
 from tms_agents.floor.visitors import Visitors
 
@@ -129,7 +130,7 @@ class Objects:
 
         ``scattered`` (3,) is what `shine.scatter` has learned; ``intact``: nothing has gone from the room.
         """
-        if ((bodies["used"] == 1) & (bodies["machine"] == 1)).any():
+        if has_robot(bodies):
             self.robot_at = t
         s = self._settings
         if self._ripe.size != prints.size:

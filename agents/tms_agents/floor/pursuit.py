@@ -142,6 +142,16 @@ def goes(footprints: Any, seen: NDArray[np.bool_]) -> int:
 
 
 @njit(cache=True)
+def bodiless(footprints: Any, seen: NDArray[np.bool_], start: int) -> int:
+    """The first from ``start`` on that was ``seen`` (n,), is a robot, and is none of the bodies yet; -1: none."""
+    for index in range(start, footprints.size):
+        q = footprints[index]
+        if seen[index] and q.used and q.sure and q.body < 0:
+            return index
+    return -1
+
+
+@njit(cache=True)
 def own(
     footprints: Any,
     order: NDArray[np.int64],

@@ -45,6 +45,15 @@ def recognize(bodies: Any, least: float, most: float) -> int:
 
 
 @njit(cache=True)
+def has_robot(bodies: Any) -> bool:
+    """Whether any of the ``bodies`` (n,) is a robot for certain."""
+    found = False
+    for b in range(bodies.size):
+        found = found or (bodies[b].used == 1 and bodies[b].machine == 1)
+    return found
+
+
+@njit(cache=True)
 def _foot(c: Any, bodies: Any, t: float) -> bool:
     """Whether the foot of a person was just where the cluster is."""
     for b in range(bodies.size):

@@ -244,29 +244,29 @@ def test_where_the_door_is_feet_count_a_little_outside_too() -> None:
 )
 def test_a_walker_of_whom_one_leg_is_missing_is_a_worse_explanation(change: dict[str, float], price: float) -> None:
     """Else a seated person takes one leg of whoever passes, and both have one from then on."""
-    bodies, rows = empty(BODY, 1), np.zeros(1, np.int64)
+    bodies = empty(BODY, 1)
     walker(bodies[0], 3.0, 0.0, (1.0, 0.0), NOW)
     bodies["b_seen"] = NOW - 0.7
     for name, value in change.items():
         bodies[name] = value
-    assert missed(bodies, rows, NOW, OPEN, joined([])) == pytest.approx(price)
+    assert missed(bodies[0], NOW, OPEN, joined([])) == pytest.approx(price)
 
 
 @pytest.mark.parametrize(("away", "price"), [(0.3, 0.3), (0.8, 2.0)])
 def test_feet_that_vanish_beside_a_seat_may_have_been_lifted(away: float, price: float) -> None:
     """Else he takes a foot of whoever is near rather than sit down."""
-    bodies, rows = empty(BODY, 1), np.zeros(1, np.int64)
+    bodies = empty(BODY, 1)
     walker(bodies[0], 3.0 - away, 0.0, (0.0, 0.0), NOW - 0.5)
     seat = [(3.0, -1.0), (4.0, -1.0), (4.0, 1.0), (3.0, 1.0)]
-    assert missed(bodies, rows, NOW, OPEN, joined([seat])) == pytest.approx(price)
+    assert missed(bodies[0], NOW, OPEN, joined([seat])) == pytest.approx(price)
 
 
 def test_a_leg_behind_somebody_is_not_missed() -> None:
-    bodies, rows = empty(BODY, 1), np.zeros(1, np.int64)
+    bodies = empty(BODY, 1)
     walker(bodies[0], 3.0, 0.0, (1.0, 0.0), NOW)
     bodies["b_seen"] = NOW - 0.7
     before = (np.full(101, 2.0), np.full(101, FOREGROUND, np.int8), *OPEN[2:])
-    assert missed(bodies, rows, NOW, before, joined([])) == 0.0
+    assert missed(bodies[0], NOW, before, joined([])) == 0.0
 
 
 @pytest.mark.parametrize(("width", "far", "cheap"), [(0.1, 0.7, False), (0.4, 0.7, True), (0.1, 0.2, True)])
