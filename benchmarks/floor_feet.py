@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from floor_landing import fit
-from floor_told import Job, Scan, Told
+from floor_told import Explained, Job, Told
 
 from tms_agents.floor.build import SHOES
 from tms_agents.floor.landing import landing
@@ -105,11 +105,12 @@ class _Landings(Told):
         super().__init__(most, prints, seats, job)
         self.choices: list[Choice] = []
 
-    def explained(self, scan: Scan) -> None:
-        for i in np.flatnonzero(scan.columns < 2 * scan.rows.size):
+    def explained(self, found: Explained) -> None:
+        scan = found.scan
+        for i in np.flatnonzero(found.columns < 2 * found.rows.size):
             age = scan.t - scan.prints[scan.of[i]]["first"] if scan.of[i] >= 0 else 0.0
             if age < _FRESH_S:
-                self._note(scan.clusters[i], scan.cost[i], scan.rows, scan.columns[i] // 2, scan.t - age)
+                self._note(scan.clusters[i], found.cost[i], found.rows, found.columns[i] // 2, scan.t - age)
 
     def _note(self, c: Any, cost: Any, rows: Any, owner: int, since: float) -> None:
         """The foot c, there since that time (s), is one of the body rows[owner]: who else might have put it down?"""

@@ -14,10 +14,11 @@ import numpy as np
 from floor_contestants import Ours
 from numpy.typing import NDArray
 
-from tms_agents.floor.adopting import BLANK, adopt, complete
+from tms_agents.floor.adopting import adopt, complete
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.association import Association
 from tms_agents.floor.bodies import predict
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.likelihood import UNLIKELY
 from tms_agents.floor.nobodys import costs, known
 from tms_agents.floor.settings import Polygon
@@ -37,18 +38,14 @@ class Job(NamedTuple):
     laser: str
 
 
-class Scan(NamedTuple):
-    """What is known when a scan is to be explained, and the right explanation.
+class Explained(NamedTuple):
+    """A scan, what is known when it is to be explained, and the right explanation.
 
-    Clusters (m,), their prints ``of`` (m,) and ``marks`` (m, 4); movers ``rows`` (k,) of the bodies, ``cost``
-    (m, 2k + m) as `costs` fills it, ``columns`` (m,) the right assignment; ``sight`` as `clear` takes it.
+    Movers ``rows`` (k,) of the bodies, ``cost`` (m, 2k + m) as `costs` fills it, ``columns`` (m,) the right assignment;
+    ``sight`` as `clear` takes it.
     """
 
-    t: float
-    clusters: Any
-    of: NDArray[np.int64]
-    marks: Any
-    prints: Any
+    scan: ClusteredScan
     rows: NDArray[np.int64]
     cost: NDArray[np.float64]
     columns: NDArray[np.int64]
@@ -86,31 +83,29 @@ class Told(Association):
             ours.scan(frame.sensor, frame.t, frame.ranges, frame.intensities if job.laser == "fine" else None)
         return told[0]
 
-    def explained(self, scan: Scan) -> None:
+    def explained(self, found: Explained) -> None:
         """The right explanation of a scan is known, and nothing has come of it yet."""
 
-    def step(
-        self, clusters: Any, of: NDArray[np.int64], marks: Any, prints: Any, t: float, sight: Any
-    ) -> NDArray[np.bool_]:
-        predict(self.bodies, t)
+    def step(self, scan: ClusteredScan, sight: Any) -> NDArray[np.bool_]:
+        predict(self.bodies, scan.t)
         rows = np.flatnonzero((self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1))
         self._follow(rows)
-        count, columns = clusters.size, np.full(clusters.size, -1)
+        count, columns = scan.clusters.size, np.full(scan.clusters.size, -1)
         if count and rows.size:
             cost = np.empty((count, 2 * rows.size + count))
-            costs(clusters, of, marks, np.ones(count, np.bool_), prints, self.bodies, rows, t, cost)
-            known(clusters, self.bodies, t, cost[:, 2 * rows.size :])
-            owners = [self._owner(c) for c in clusters]
+            costs(scan, np.ones(count, np.bool_), self.bodies, rows, cost)
+            known(scan, self.bodies, cost[:, 2 * rows.size :])
+            owners = [self._owner(c) for c in scan.clusters]
             right = cost.copy()
             for column, row in enumerate(rows):
                 others = [i for i, owner in enumerate(owners) if owner < 0 or owner != self.tracks.get(int(row))]
                 right[others, 2 * column : 2 * column + 2] = UNLIKELY
             assign(right, 2 * rows.size, UNLIKELY, columns)
-            self.explained(Scan(t, clusters, of, marks, prints, rows, cost, columns, sight))
+            self.explained(Explained(scan, rows, cost, columns, sight))
         free = np.ones(count, np.bool_)
-        adopt(self.bodies, rows, columns, clusters, of, marks, free, BLANK, prints, t, sight)
-        complete(self.bodies, clusters, of, marks, free, BLANK, prints, t, sight)
-        scatter(self.bodies, clusters, of, marks, t, self.scattered)
+        adopt(self.bodies, rows, columns, scan, free, sight)
+        complete(self.bodies, scan, free, sight)
+        scatter(self.bodies, scan.clusters, scan.of, scan.marks, scan.t, self.scattered)
         return ~free
 
     def rename(self, t: float) -> None:

@@ -21,12 +21,13 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
-from floor_told import Job, Scan, Told
+from floor_told import Explained, Job, Told
 from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tms_agents.floor.bodies import narrow
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.fitted import LEGS, SHOES, Legs, Shoes
 from tms_agents.floor.likelihood import UNLIKELY, feet_by
 from tms_agents.floor.missing import missed
@@ -78,8 +79,9 @@ class _Situations(Told):
         super().__init__(most, prints, seats, job)
         self.noted: list[Situation] = []
 
-    def explained(self, scan: Scan) -> None:
-        clusters, rows = scan.clusters, scan.rows
+    def explained(self, found: Explained) -> None:
+        scan, rows = found.scan, found.rows
+        clusters = scan.clusters
         bodies = self.bodies[rows]
         who = [self.tracks.get(int(row)) for row in rows]
         owners = [self._owners(c) for c in clusters]
@@ -97,7 +99,7 @@ class _Situations(Told):
         prints = scan.prints[np.maximum(scan.of[seen], 0)].copy()
         place = {int(rows[k]): index for index, k in enumerate(near)}
         prints["owner"] = [place.get(int(owner), -1) for owner in prints["owner"]]
-        cost = scan.cost[seen]
+        cost = found.cost[seen]
         theirs = np.array([[who[k] in owners[i] for k in near] for i in seen])
         least = np.array([[cost[j, 2 * k : 2 * k + 2].min() for k in near] for j in range(seen.size)])
         nobodys = cost[:, 2 * rows.size :].min(axis=1)
@@ -111,7 +113,7 @@ class _Situations(Told):
                 scan.marks[seen].copy(),
                 prints,
                 nobodys,
-                np.array([missed(self.bodies[rows[k]], scan.t, scan.sight, self.seats) for k in near]),
+                np.array([missed(self.bodies[rows[k]], scan.t, found.sight, self.seats) for k in near]),
                 _allowed(clusters[seen], nobodys, theirs, least),
             )
         )
@@ -192,9 +194,9 @@ def _nats(
         mine, here = slice(people[s], people[s + 1]), slice(seen[s], seen[s + 1])
         k, m = people[s + 1] - people[s], seen[s + 1] - seen[s]
         free, cost = np.ones(m, np.bool_), np.empty((m, 2 * k))
-        a, b, c, d = clusters[here], of[here], marks[here], prints[here]
+        scan = ClusteredScan(clusters[here], of[here], marks[here], prints[here], times[s], clusters[:1])
         for row in range(k):
-            feet_by(legs, shoes, a, b, c, free, d, bodies[mine], row, times[s], cost[:, 2 * row : 2 * row + 2])
+            feet_by(legs, shoes, scan, free, bodies[mine], row, cost[:, 2 * row : 2 * row + 2])
         least = 0.0
         for i in range(m):
             least += min(cost[i].min(), nobodys[seen[s] + i])

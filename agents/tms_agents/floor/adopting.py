@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, together, update
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.likelihood import UNLIKELY, too_wide
 from tms_agents.floor.missing import expect, missed, out_of_reach
 from tms_agents.floor.nobodys import costs
 from tms_agents.floor.norm import norm
-from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import learn
 
 Array = NDArray[np.float64]
@@ -23,8 +23,20 @@ Array = NDArray[np.float64]
 _FRESH_S = 0.4
 #: No foot is wider (m); no leg, of who is known to show legs.
 _BROAD_M, _BROAD_LEGS_M = 0.28, 0.2
-#: No cluster.
-BLANK = np.zeros(1, CLUSTER)
+
+
+class Pool(NamedTuple):
+    """Bodies that have taken their feet, in one scan: what is the same in several hypotheses is worked out once.
+
+    ``bodies`` (p,) of `state.BODY`; ``taken`` (p, 4): the first hypothesis in which each was the same before, both
+    feet, and the one before in the pool that is of the same row; ``misses`` (p,) what `missed` finds of each; ``last``
+    (n,) the last one of each row, -1: none.
+    """
+
+    bodies: Any
+    taken: NDArray[np.int64]
+    misses: Array
+    last: NDArray[np.int64]
 
 
 @njit(cache=True)
@@ -32,23 +44,18 @@ def adopt(
     bodies: Any,
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
+    scan: ClusteredScan,
     free: NDArray[np.bool_],
-    blank: Any,
-    prints: Any,
-    t: float,
     sight: Any,
 ) -> None:
-    """Let the clusters (m,) be the feet that ``columns`` (m,) say of the bodies ``rows`` (k,): 2i and 2i + 1 of row i.
+    """Let the clusters be the feet that ``columns`` (m,) say of the bodies ``rows`` (k,): 2i and 2i + 1 of row i.
 
     Of those that are ``free`` (m,); what is somebody's is so no more.
     """
     feet = _feet_of(columns, rows.size, free)
     for column in range(rows.size):
         a, b = feet[2 * column], feet[2 * column + 1]
-        _take(bodies[rows[column]], a, b, clusters, of, marks, blank, prints, t, sight)
+        _take(bodies[rows[column]], a, b, scan, sight)
 
 
 @njit(cache=True)
@@ -58,45 +65,36 @@ def adopt_from(
     bodies: Any,
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
+    scan: ClusteredScan,
     free: NDArray[np.bool_],
-    blank: Any,
-    prints: Any,
-    t: float,
     sight: Any,
     seats: Any,
-    pool: Any,
-    seen: NDArray[np.int64],
-    misses: Array,
-    last: NDArray[np.int64],
+    pool: Pool,
     pooled: int,
 ) -> tuple[int, float]:
     """As `adopt`, from the bodies of the ``parent`` into ``bodies`` (n,), without doing the same twice in a scan.
 
     Whoever was the same (``first`` (n,): in that hypothesis) and has taken the same feet before is copied from the
     ``pool``, in which so many are ``pooled``: how many are now, and what `missed`, which takes ``seats``, finds of all.
-    ``seen`` (pool, 4) says which those are: first, both feet, and the one before of the same row; ``misses`` (pool,)
-    what it found of each; ``last`` (n,) the last of each row.
     """
+    taken_by, known, misses, last = pool.bodies, pool.taken, pool.misses, pool.last
     feet, unseen = _feet_of(columns, rows.size, free), 0.0
     for column in range(rows.size):
         row, a, b = rows[column], feet[2 * column], feet[2 * column + 1]
         found = last[row]
-        while found >= 0 and not (seen[found, 0] == first[row] and seen[found, 1] == a and seen[found, 2] == b):
-            found = seen[found, 3]
+        while found >= 0 and not (known[found, 0] == first[row] and known[found, 1] == a and known[found, 2] == b):
+            found = known[found, 3]
         if found >= 0:
-            bodies[row] = pool[found]
+            bodies[row] = taken_by[found]
             unseen += misses[found]
             continue
         bodies[row] = parent[row]
-        _take(bodies[row], a, b, clusters, of, marks, blank, prints, t, sight)
-        miss = missed(bodies[row], t, sight, seats)
+        _take(bodies[row], a, b, scan, sight)
+        miss = missed(bodies[row], scan.t, sight, seats)
         unseen += miss
-        if pooled < pool.size:
-            pool[pooled], misses[pooled] = bodies[row], miss
-            seen[pooled, 0], seen[pooled, 1], seen[pooled, 2], seen[pooled, 3] = first[row], a, b, last[row]
+        if pooled < taken_by.size:
+            taken_by[pooled], misses[pooled] = bodies[row], miss
+            known[pooled, 0], known[pooled, 1], known[pooled, 2], known[pooled, 3] = first[row], a, b, last[row]
             last[row] = pooled
             pooled += 1
     return pooled, unseen
@@ -114,24 +112,14 @@ def _feet_of(columns: NDArray[np.int64], k: int, free: NDArray[np.bool_]) -> NDA
 
 
 @njit(cache=True)
-def _take(
-    body: Any,
-    a: int,
-    b: int,
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    blank: Any,
-    prints: Any,
-    t: float,
-    sight: Any,
-) -> None:
+def _take(body: Any, a: int, b: int, scan: ClusteredScan, sight: Any) -> None:
     """The clusters a and b (-1: none) are the feet of the body."""
+    clusters, of, marks, t = scan.clusters, scan.of, scan.marks, scan.t
     for i in (a, b):
         if i >= 0 and not clusters[i].cut:
             learn(body, marks[i, 0], marks[i, 1])
-    one = clusters[a] if a >= 0 else blank[0]
-    two = clusters[b] if b >= 0 else blank[0]
+    one = clusters[a] if a >= 0 else scan.blank[0]
+    two = clusters[b] if b >= 0 else scan.blank[0]
     leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)
     x, y, vx, vy, pp, pv, vv = body.x, body.y, body.vx, body.vy, body.pp, body.pv, body.vv
     update(
@@ -145,7 +133,7 @@ def _take(
         of[b] if b >= 0 else -1,
         marks[b, 2] if b >= 0 else 0.0,
         (a < 0) != (b < 0) and together(body, clusters, max(a, b), t),
-        prints,
+        scan.prints,
         t,
     )
     if leaves:
@@ -153,19 +141,9 @@ def _take(
 
 
 @njit(cache=True)
-def complete(
-    bodies: Any,
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    blank: Any,
-    prints: Any,
-    t: float,
-    sight: Any,
-) -> None:
+def complete(bodies: Any, scan: ClusteredScan, free: NDArray[np.bool_], sight: Any) -> None:
     """What the movers that are believed have left goes to those who are not yet, and then begins new ones."""
-    m = clusters.size
+    clusters, of, prints, t, m = scan.clusters, scan.of, scan.prints, scan.t, scan.clusters.size
     scratch = np.empty(bodies.size, np.int64)
     k = chosen(bodies, 0, scratch)
     rows = scratch[:k]
@@ -173,9 +151,9 @@ def complete(
         columns = np.full(m, -1)
         if m:
             cost = np.empty((m, 2 * k + m))
-            costs(clusters, of, marks, free, prints, bodies, rows, t, cost)
+            costs(scan, free, bodies, rows, cost)
             assign(cost, 2 * k, UNLIKELY, columns)
-        adopt(bodies, rows, columns, clusters, of, marks, free, blank, prints, t, sight)
+        adopt(bodies, rows, columns, scan, free, sight)
     for i in range(m):
         c = clusters[i]
         if (

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.association import Association
 from tms_agents.floor.background import FOREGROUND
 from tms_agents.floor.build import count_shoes, legs, only_legs
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.dark import dark_width
 from tms_agents.floor.events import FloorEvent, FloorLabel
 from tms_agents.floor.footprints import Footprints
@@ -154,7 +155,8 @@ class FloorEstimator:
         measure(clusters, view.ranges, lights, increment_s, self._association.scattered, marks)
         note(prints, clusters, of, marks)
         somebodys = np.zeros(clusters.size, np.bool_)
-        somebodys[:feet] = self._association.step(clusters[:feet], of[:feet], marks[:feet], prints, t, view.sight)
+        seen = ClusteredScan(clusters[:feet], of[:feet], marks[:feet], prints, t)
+        somebodys[:feet] = self._association.step(seen, view.sight)
         bodies = self._association.bodies
         count_shoes(bodies, clusters[:feet], of[:feet], t, self._shoes)
         self._association.agree(self._shoes)

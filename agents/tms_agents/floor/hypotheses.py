@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.state import BODY
+from tms_agents.floor.state import BODY, empty
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -28,6 +28,29 @@ _NAMES = BODY.names or ()
 ALL = np.arange(len(_NAMES))
 FEET = np.array([index for index, field in enumerate(_NAMES) if field not in BESIDES])
 FOUND = np.array([index for index, field in enumerate(_NAMES) if field not in _LATELY])
+
+
+class Hypotheses(NamedTuple):
+    """So many hypotheses about who is where; `nothing_known` makes them.
+
+    ``bodies`` (kept, n) of `state.BODY`, and the same as integers, ``raw`` (kept, n, fields); ``beliefs`` (kept, n, n),
+    how likely each body is who has each name (`identity`); ``nobodys_at`` (kept, p), when each print was last seen to
+    be nobody's who is believed.
+    """
+
+    bodies: Any
+    raw: Integers
+    beliefs: Array
+    nobodys_at: Array
+
+
+def nothing_known(kept: int, most: int, prints: int) -> Hypotheses:
+    """Of so many bodies and prints."""
+    bodies, beliefs = empty(BODY, (kept, most)), np.zeros((kept, most, most))
+    beliefs[:] = np.eye(most)
+    # All fields are as long as an integer: what is the same to the last bit is found by these.
+    raw = bodies.view(np.int64).reshape(kept, most, -1)
+    return Hypotheses(bodies, raw, beliefs, np.full((kept, prints), -1e9))
 
 
 @njit(cache=True)
@@ -96,31 +119,25 @@ def copy(source: Any, source_belief: Array, target: Any, target_belief: Array, b
 
 
 @njit(cache=True)
-def exchange(one: Any, one_belief: Array, two: Any, two_belief: Array, between: Any, between_belief: Array) -> None:
-    """Exchange two hypotheses by way of a third, which is overwritten."""
-    copy(one, one_belief, between, between_belief, True)
-    copy(two, two_belief, one, one_belief, True)
-    copy(between, between_belief, two, two_belief, True)
+def exchange(some: Hypotheses, i: int, j: int, between: Hypotheses) -> None:
+    """Exchange the hypotheses i and j by way of the first of others, which is overwritten."""
+    bodies, beliefs, nobodys_at = some.bodies, some.beliefs, some.nobodys_at
+    copy(bodies[i], beliefs[i], between.bodies[0], between.beliefs[0], True)
+    copy(bodies[j], beliefs[j], bodies[i], beliefs[i], True)
+    copy(between.bodies[0], between.beliefs[0], bodies[j], beliefs[j], True)
+    for p in range(nobodys_at.shape[1]):
+        nobodys_at[i, p], nobodys_at[j, p] = nobodys_at[j, p], nobodys_at[i, p]
 
 
 @njit(cache=True)
-def settle(
-    hypotheses: Any,
-    raw: Integers,
-    before: Integers,
-    decided: NDArray[np.bool_],
-    scores: Array,
-    beliefs: Array,
-    nobodys_at: Array,
-    count: int,
-) -> int:
+def settle(some: Hypotheses, before: Integers, decided: NDArray[np.bool_], scores: Array, count: int) -> int:
     """What became of bodies of the best hypothesis holds in all in which they were the same: how many there are.
 
-    Hypotheses (kept, n), as integers ``raw`` (kept, n, fields); bodies of the best as they were ``before``
-    (1, n, fields). Hypotheses in which one is another that is ``decided`` (n,) are dropped; ``scores``, ``beliefs`` and
-    ``nobodys_at`` move along.
+    ``before`` (1, n, fields): those of the best as they were, as integers. Hypotheses in which one is another that is
+    ``decided`` (n,) are dropped; ``scores`` (kept,) move along.
     """
-    n = hypotheses.shape[1]
+    bodies, raw, beliefs, nobodys_at = some
+    n = bodies.shape[1]
     kept = 1
     for h in range(1, count):
         good = True
@@ -129,11 +146,11 @@ def settle(
         if not good:
             continue
         if kept < h:
-            copy(hypotheses[h], beliefs[h], hypotheses[kept], beliefs[kept], True)
+            copy(bodies[h], beliefs[h], bodies[kept], beliefs[kept], True)
             scores[kept] = scores[h]
             nobodys_at[kept] = nobodys_at[h]
         for b in range(n):
-            if hypotheses[kept, b].used and _equal(raw, kept, before, 0, b, FEET):
+            if bodies[kept, b].used and _equal(raw, kept, before, 0, b, FEET):
                 for field in FOUND:
                     raw[kept, b, field] = raw[0, b, field]
         kept += 1

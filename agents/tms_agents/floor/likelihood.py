@@ -21,6 +21,7 @@ from tms_agents.floor.build import (
     sole,
     wears_shoes,
 )
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.fitted import Legs, Shoes
 from tms_agents.floor.landing import Way, lands, way
 from tms_agents.floor.norm import norm
@@ -157,37 +158,18 @@ def _strides(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
-def feet(
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    prints: Any,
-    bodies: Any,
-    row: int,
-    t: float,
-    cost: Array,
-) -> None:
-    """Fill ``cost`` (m, 2): what it costs that the clusters (m,) that are ``free`` are the feet of the body ``row``."""
-    feet_by(fitted.LEGS, fitted.SHOES, clusters, of, marks, free, prints, bodies, row, t, cost)
+def feet(scan: ClusteredScan, free: NDArray[np.bool_], bodies: Any, row: int, cost: Array) -> None:
+    """Fill ``cost`` (m, 2): what it costs that the clusters that are ``free`` (m,) are the feet of the body ``row``."""
+    feet_by(fitted.LEGS, fitted.SHOES, scan, free, bodies, row, cost)
 
 
-@njit(cache=True)
+# In `feet` the numbers are known when it is compiled; to hand all of them over takes longer.
+@njit(cache=True, inline="always")
 def feet_by(
-    legs: Legs,
-    shoes: Shoes,
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    prints: Any,
-    bodies: Any,
-    row: int,
-    t: float,
-    cost: Array,
+    legs: Legs, shoes: Shoes, scan: ClusteredScan, free: NDArray[np.bool_], bodies: Any, row: int, cost: Array
 ) -> None:
     """As `feet`, by other numbers than those in use."""
-    body = bodies[row]
+    body, clusters, of, marks, prints, t = bodies[row], scan.clusters, scan.of, scan.marks, scan.prints, scan.t
     reach = _REACH_M + 1.5 * np.sqrt(body.pp)
     goes = way(body)
     for i in range(clusters.size):
@@ -206,7 +188,7 @@ def feet_by(
             break
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _foot(
     legs: Legs,
     shoes: Shoes,
@@ -221,6 +203,7 @@ def _foot(
     cost: Array,
 ) -> None:
     """Lower ``cost`` (2,) to that of the cluster c, on ``print_`` (-1: none), being the first and the second foot."""
+    # Not the whole scan: to hand it over for each cluster takes longer than all the rest.
     away = norm(c.x - body.x, c.y - body.y)
     q = prints[print_] if print_ >= 0 else prints[0]
     age = t - q.first if print_ >= 0 else 0.0

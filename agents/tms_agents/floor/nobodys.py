@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.bodies import STAND_M, WIDE_M, narrow, scant
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
 from tms_agents.floor.norm import norm
 from tms_agents.floor.prints import thin
@@ -31,18 +32,8 @@ _PART, _FEW, _FADED = 2.0, 2, 4
 
 
 @njit(cache=True)
-def costs(
-    clusters: Any,
-    of: NDArray[np.int64],
-    marks: Array,
-    free: NDArray[np.bool_],
-    prints: Any,
-    bodies: Any,
-    rows: NDArray[np.int64],
-    t: float,
-    cost: Array,
-) -> None:
-    """Fill ``cost`` (m, 2k + m): negative log likelihoods of the clusters (m,) being feet of the bodies ``rows`` (k,).
+def costs(scan: ClusteredScan, free: NDArray[np.bool_], bodies: Any, rows: NDArray[np.int64], cost: Array) -> None:
+    """Fill ``cost`` (m, 2k + m): negative log likelihoods of the clusters being feet of the bodies ``rows`` (k,).
 
     A foot goes on standing where it stood, or it has stepped: then it lands near the body. Only a fresh print can be
     a step: what has stood there for long is no foot. The last m columns are for clusters that are nobody's: a fresh
@@ -50,27 +41,19 @@ def costs(
     """
     k = rows.size
     for column in range(k):
-        feet(clusters, of, marks, free, prints, bodies, rows[column], t, cost[:, 2 * column : 2 * column + 2])
-    spans = np.empty(clusters.size)
-    spanned(clusters, spans)
-    nobodys(clusters, of, prints, bodies, rows, spans, t, cost[:, 2 * k :])
+        feet(scan, free, bodies, rows[column], cost[:, 2 * column : 2 * column + 2])
+    spans = np.empty(scan.clusters.size)
+    spanned(scan.clusters, spans)
+    nobodys(scan, bodies, rows, spans, cost[:, 2 * k :])
 
 
 @njit(cache=True)
-def nobodys(
-    clusters: Any,
-    of: NDArray[np.int64],
-    prints: Any,
-    bodies: Any,
-    rows: NDArray[np.int64],
-    spans: Array,
-    t: float,
-    cost: Array,
-) -> None:
+def nobodys(scan: ClusteredScan, bodies: Any, rows: NDArray[np.int64], spans: Array, cost: Array) -> None:
     """Fill ``cost`` (m, m): on its diagonal what it costs that a cluster is a foot of none of the bodies ``rows``.
 
     ``spans`` (m,) is what `spanned` gives.
     """
+    clusters, of, prints, t = scan.clusters, scan.of, scan.prints, scan.t
     m, k = clusters.size, rows.size
     longest = LONGEST_SHOE_M if _shod(bodies, rows) else LEG_M
     for i in range(m):
@@ -107,8 +90,9 @@ def _has_left(body: Any, c: Any, q: Any, t: float) -> bool:
 
 
 @njit(cache=True)
-def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
+def known(scan: ClusteredScan, bodies: Any, cost: Array) -> None:
     """Lower the ``cost`` (m, m) of being nobody's of clusters that go on with somebody new who is not believed yet."""
+    clusters, t = scan.clusters, scan.t
     for i in range(clusters.size):
         c = clusters[i]
         for b in range(bodies.size):
@@ -122,16 +106,7 @@ def known(clusters: Any, bodies: Any, t: float, cost: Array) -> None:
 
 
 @njit(cache=True)
-def goes_on(
-    clusters: Any,
-    of: NDArray[np.int64],
-    prints: Any,
-    bodies: Any,
-    rows: NDArray[np.int64],
-    nobodys_at: Array,
-    t: float,
-    cost: Array,
-) -> None:
+def goes_on(scan: ClusteredScan, bodies: Any, rows: NDArray[np.int64], nobodys_at: Array, cost: Array) -> None:
     """Lower the ``cost`` (m, m) of being nobody's of clusters on prints that were so just before, if people wear shoes.
 
     ``nobodys_at`` (p,) is when each print was nobody's last, in the hypothesis in which ``rows`` (k,) are who is there.
@@ -140,7 +115,8 @@ def goes_on(
     """
     if not _shod(bodies, rows):
         return
-    for i in range(clusters.size):
+    of, prints, t = scan.of, scan.prints, scan.t
+    for i in range(of.size):
         p = of[i]
         if p >= 0 and nobodys_at[p] >= prints[p].first and t - nobodys_at[p] < _BEFORE_S:
             cost[i, i] = min(cost[i, i], _GOES_ON)

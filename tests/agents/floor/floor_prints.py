@@ -1,9 +1,10 @@
-"""Prints for tests: what rests on the floor, as the estimator keeps it."""
+"""Prints for tests, what rests on the floor as the estimator keeps it; and scans that show it."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.state import PRINT, empty
 
 NOW = 100.0
@@ -19,3 +20,8 @@ def resting(seconds: float, width: float = 0.1, **fields: float) -> np.ndarray:
     for name, value in (values | fields).items():
         prints[name] = value
     return prints
+
+
+def shows(clusters: np.ndarray, prints: np.ndarray, t: float = NOW, print_: int = -1) -> ClusteredScan:
+    """A scan of these clusters, all on one print (-1: on none), that tells nothing of how they echo."""
+    return ClusteredScan(clusters, np.full(clusters.size, print_), np.zeros((clusters.size, 4)), prints, t)

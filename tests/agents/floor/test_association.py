@@ -9,6 +9,7 @@ import pytest
 
 from tms_agents.floor import FloorEstimator, Sensor, association, likelihood
 from tms_agents.floor.association import Association
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.hypotheses import BESIDES
 from tms_agents.simulation.floor_world import FloorWorld
 
@@ -35,19 +36,19 @@ def test_whose_foot_it_is_has_nothing_to_do_with_the_rest(feet: Any, monkeypatch
     rng = np.random.default_rng(0)
     compared, plain = [0], Association.step
 
-    def step(self: Association, clusters: Any, of: Any, marks: Any, prints: Any, t: float, sight: Any) -> Any:
+    def step(self: Association, scan: ClusteredScan, sight: Any) -> Any:
         bodies = self.bodies.copy()
         other = bodies.copy()
         for field in BESIDES:
             other[field] = rng.integers(0, 100, other.size)
-        free = np.ones(clusters.size, np.bool_)
+        free = np.ones(scan.clusters.size, np.bool_)
         for row in np.flatnonzero(bodies["used"]).tolist():
-            one, two = np.empty((clusters.size, 2)), np.empty((clusters.size, 2))
-            likelihood.feet(clusters, of, marks, free, prints, bodies, row, t, one)
-            likelihood.feet(clusters, of, marks, free, prints, other, row, t, two)
+            one, two = np.empty((free.size, 2)), np.empty((free.size, 2))
+            likelihood.feet(scan, free, bodies, row, one)
+            likelihood.feet(scan, free, other, row, two)
             np.testing.assert_array_equal(one, two)
             compared[0] += int((one < likelihood.UNLIKELY).sum())
-        return plain(self, clusters, of, marks, prints, t, sight)
+        return plain(self, scan, sight)
 
     monkeypatch.setattr(Association, "step", step)
     _told("three close", feet)

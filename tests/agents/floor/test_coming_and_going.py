@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from floor_prints import shows
 from floor_rooms import Room, sweep
 from floor_rooms import walker as legs_of
 from hypothesis import given
@@ -126,7 +127,7 @@ def test_who_has_sat_down_in_clear_view_gets_up_beside_the_seat(clear: float, aw
     clusters, prints, cost = np.zeros(1, CLUSTER), empty(PRINT, 1), np.zeros((1, 2))
     clusters["x"], clusters["y"], clusters["n"], clusters["width"] = 4.0, 2.1 - away, 8, 0.1
     clusters["spacing"] = 0.01
-    feet(clusters, np.zeros(1, np.int64) - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, one.bodies, 0, NOW, cost)
+    feet(shows(clusters, prints, NOW), np.ones(1, np.bool_), one.bodies, 0, cost)
     assert (cost.min() < UNLIKELY) == may
 
 
@@ -277,8 +278,8 @@ def test_a_robot_seen_as_a_sliver_in_a_door_does_not_become_the_leg_of_who_comes
     bodies["used"] = bodies["confirmed"] = bodies["robot"] = bodies["machine"] = 1
     bodies["far"], bodies["width"], bodies["seen"] = far, 0.05, NOW - 0.1
     clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.1, 8, width, 0.01
-    cost, zero = np.zeros((1, 3)), np.zeros(1, np.int64)
-    costs(clusters, zero - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, zero, NOW, cost)
+    cost = np.zeros((1, 3))
+    costs(shows(clusters, prints, NOW), np.ones(1, np.bool_), bodies, np.zeros(1, np.int64), cost)
     assert (cost[0, 0] < 3.0) == cheap
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from floor_prints import NOW, resting
+from floor_prints import NOW, resting, shows
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, Scene
@@ -151,8 +151,7 @@ def test_nobody_begins_by_a_step_that_is_too_long(away: float, may_step: bool) -
     prints["used"], prints["first"], prints["rested"], prints["last"] = 1, NOW - 0.1, NOW - 0.1, NOW
     clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = away, 6, 0.1, 0.015
     cost = np.zeros((1, 3))
-    one = np.zeros(1, np.int64)
-    costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, NOW, cost)
+    costs(shows(clusters, prints, print_=0), np.ones(1, np.bool_), bodies, np.zeros(1, np.int64), cost)
     assert bool(cost[0, :2].min() < UNLIKELY) == may_step
 
 
@@ -168,7 +167,7 @@ def test_what_was_his_foot_a_moment_ago_may_be_again() -> None:
     one, cost = np.zeros(1, np.int64), np.zeros((2, 1, 3))
     for label, each in zip((7, 3), cost, strict=True):
         prints["whose"], prints["owned"] = label, NOW - 0.1
-        costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, NOW, each)
+        costs(shows(clusters, prints, print_=0), np.ones(1, np.bool_), bodies, one, each)
     assert cost[1, 0, 0] < cost[0, 0, 0] - 1.0
 
 
@@ -192,7 +191,7 @@ def test_who_stood_has_not_stepped_off_what_is_still_there(fields: dict[str, flo
     for name, value in fields.items():
         bodies[name] = value
     clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 1.0, 12, 0.12, 0.01
-    nobodys(clusters, one, prints, bodies, one, np.array([np.inf]), NOW, cost)
+    nobodys(shows(clusters, prints, print_=0), bodies, one, np.array([np.inf]), cost)
     assert cost[0, 0] == pytest.approx(price)
 
 
@@ -231,8 +230,8 @@ def test_a_foot_as_wide_as_two_legs_is_none_if_the_other_leg_is_seen_somewhere_e
         bodies["bx"], bodies["b_seen"], bodies["b_print"] = (-0.2 if apart else 0.2), 9.9, -1
         bodies["own_girth"], bodies["own_girth_n"] = 0.11, seen
         clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.2, 20, width, 0.01
-        cost, zero = np.zeros((1, 3)), np.zeros(1, np.int64)
-        costs(clusters, zero - 1, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, zero, 10.0, cost)
+        cost = np.zeros((1, 3))
+        costs(shows(clusters, prints, 10.0), np.ones(1, np.bool_), bodies, np.zeros(1, np.int64), cost)
         found.append(cost[0, 0])
     assert found[1] - found[0] == pytest.approx(dearer)
 
@@ -257,13 +256,14 @@ def test_what_lies_still_while_a_robot_drives_past_is_no_part_of_it(drove_s: flo
 
 
 def test_what_is_too_thin_for_a_foot_costs_less_to_be_nobodys() -> None:
-    one, cost = np.zeros(1, np.int64), np.zeros((3, 1, 1))
+    cost = np.zeros((3, 1, 1))
     clusters = np.zeros(1, CLUSTER)
     clusters["n"], clusters["spacing"], clusters["mirror"] = 8, 0.01, -1
     shapes: list[dict[str, float]] = [{"width": 0.1}, {"width": 0.06}, {"width": 0.06, "whole": 3}]
     for each, shape in zip(cost, shapes, strict=True):
         clusters["width"] = shape["width"]
-        nobodys(clusters, one, resting(3.0, **shape), empty(BODY, 1), one[:0], np.array([np.inf]), NOW, each)
+        scan = shows(clusters, resting(3.0, **shape), print_=0)
+        nobodys(scan, empty(BODY, 1), np.zeros(0, np.int64), np.array([np.inf]), each)
     wide, thin, in_part = cost[:, 0, 0]
     assert thin < wide - 1.0
     assert in_part == wide
@@ -278,5 +278,5 @@ def test_what_is_pushed_goes_on_beside_who_pushes_it(pushed: int, price: float) 
     bodies["from_furniture"] = (0, pushed)
     clusters["width"] = 0.3
     cost = np.full((1, 1), 11.0)
-    known(clusters, bodies, 10.0, cost)
+    known(shows(clusters, empty(PRINT, 1), 10.0), bodies, cost)
     assert cost[0, 0] == price

@@ -17,7 +17,7 @@ _KEPT, _BODIES = 4, 6
 def _association() -> tuple[Association, Any]:
     """Four hypotheses about three people; all differ in where the second is, the last one in where the first is."""
     association = Association(_BODIES, 1)
-    hypotheses = association._hypotheses
+    hypotheses = association._now.bodies
     for h in range(_KEPT):
         for b in range(3):
             body = hypotheses[h, b]
@@ -26,7 +26,7 @@ def _association() -> tuple[Association, Any]:
     hypotheses["x"][:_KEPT, 1] = np.arange(_KEPT)
     hypotheses["x"][3, 0] = 7.0
     association._count = _KEPT
-    association._scores[:_KEPT] = association._nobodys_at[:_KEPT, 0] = np.arange(_KEPT)
+    association._scores[:_KEPT] = association._now.nobodys_at[:_KEPT, 0] = np.arange(_KEPT)
     return association, hypotheses
 
 
@@ -71,7 +71,7 @@ def test_where_he_is_another_one_counts_no_more_once_it_is_decided() -> None:
     association.settle()
     assert association._count == 3
     assert hypotheses["label"][:3, 0].tolist() == [12, 12, 12]
-    assert hypotheses["x"][:3, 1].tolist() == association._nobodys_at[:3, 0].tolist() == [0.0, 1.0, 2.0]
+    assert hypotheses["x"][:3, 1].tolist() == association._now.nobodys_at[:3, 0].tolist() == [0.0, 1.0, 2.0]
     association.mark()
     association.bodies["x"][1] = 0.5
     association.decide_changed()
@@ -97,6 +97,6 @@ def test_the_best_stays_what_it_is_and_the_order_is_kept(changed: list[int], dec
     association.settle()
     np.testing.assert_array_equal(association.bodies, best)
     scores = association._scores[: association._count].tolist()
-    assert scores == sorted(scores) == association._nobodys_at[: association._count, 0].tolist()
+    assert scores == sorted(scores) == association._now.nobodys_at[: association._count, 0].tolist()
     assert association._count == (1 if 1 in decided else 3 if 0 in decided else 4)
     assert hypotheses.dtype == BODY

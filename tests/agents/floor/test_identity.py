@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tms_agents.floor.build import beat, size_up
+from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.identity import alike, christen, renamed, unite
 from tms_agents.floor.nobodys import costs
 from tms_agents.floor.segmentation import CLUSTER
@@ -169,13 +170,13 @@ def test_a_shoe_that_points_another_way_than_he_goes_is_less_likely_his(
 
 def _price(bodies, row: int, width: float, cut: int = 0, turned: float = 0.0) -> float:
     """What it costs that a cluster so wide, which points so far from the x axis (rad), is a foot of the body."""
-    clusters, prints = np.zeros(1, CLUSTER), empty(PRINT, 1)
+    clusters = np.zeros(1, CLUSTER)
     clusters["n"], clusters["width"], clusters["spacing"], clusters["cut"] = 10, width, 0.01, cut
     clusters["ex"], clusters["ey"], clusters["slant"] = np.cos(turned), np.sin(turned), 1.0
     cost = np.zeros((1, 3))
-    one, zero = np.array([row]), np.zeros(1, np.int64)
     bodies["x"] = bodies["ax"] = bodies["bx"] = 0.0
     bodies["a_seen"] = bodies["b_seen"] = 0.9
     bodies["a_print"] = bodies["b_print"] = -1
-    costs(clusters, zero - 1, np.full((1, 4), np.nan), np.ones(1, np.bool_), prints, bodies, one, 1.0, cost)
+    scan = ClusteredScan(clusters, np.full(1, -1), np.full((1, 4), np.nan), empty(PRINT, 1), 1.0)
+    costs(scan, np.ones(1, np.bool_), bodies, np.array([row]), cost)
     return float(cost[0, 0])

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from floor_prints import shows
 
 from tms_agents.floor import FloorEstimator, Scene, Sensor
 from tms_agents.floor.left_feet import take_back
@@ -69,12 +70,12 @@ def test_who_stands_on_them_again_does_not_take_the_next_step_of_the_passer(
 ) -> None:
     bodies, prints = walks(), left(rested=NOW - stood)
     take_back(bodies, prints, NOW, expected())
-    clusters, one = np.zeros(1, CLUSTER), np.full(1, 4)
+    clusters = np.zeros(1, CLUSTER)
     clusters["x"], clusters["y"], clusters["n"], clusters["width"], clusters["spacing"] = 2.2 + away, 2.0, 6, 0.1, 0.015
     prints = np.concatenate([prints, prints[3:]])
     prints["first"][4] = prints["rested"][4] = NOW + later
     cost = np.zeros((1, 2))
-    feet(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, 0, NOW + later, cost)
+    feet(shows(clusters, prints, NOW + later, 4), np.ones(1, np.bool_), bodies, 0, cost)
     assert bool(cost.min() < UNLIKELY) == may_step
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from floor_prints import shows
 
 from tms_agents.floor.nobodys import costs, goes_on
 from tms_agents.floor.segmentation import CLUSTER, FADES
@@ -30,8 +31,7 @@ def of_nobody(clusters, shoes: bool = True) -> list[float]:
     bodies["x"], bodies["pp"], bodies["shoe"] = 2.0, 0.01, float(shoes)
     count = clusters.size
     cost = np.zeros((count, 2 + count))
-    nobody, alone = np.full(count, -1), np.zeros(1, np.int64)
-    costs(clusters, nobody, np.zeros((count, 4)), np.ones(count, np.bool_), empty(PRINT, 1), bodies, alone, 5.0, cost)
+    costs(shows(clusters, empty(PRINT, 1), 5.0), np.ones(count, np.bool_), bodies, np.zeros(1, np.int64), cost)
     return [float(cost[i, 2 + i]) for i in range(count)]
 
 
@@ -85,7 +85,7 @@ def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ag
     print_["owner"], print_["whose"], print_["owned"] = 0, int(body["label"]), t - 0.1
     clusters["x"], clusters["width"], clusters["n"], clusters["mirror"] = 0.1, 0.13, 6, -1
     cost, one = np.zeros((1, 3)), np.zeros(1, np.int64)
-    costs(clusters, one, np.zeros((1, 4)), np.ones(1, np.bool_), prints, bodies, one, t, cost)
+    costs(shows(clusters, prints, t, 0), np.ones(1, np.bool_), bodies, one, cost)
     landed, stands = cost[0, 0], cost[0, 1]
     assert stands < landed - 2.0
 
@@ -104,5 +104,5 @@ def test_whoever_came_unknown_is_paid_for_once(shoe: float, since: float, nobody
     bodies["used"] = bodies["confirmed"] = 1
     bodies["shoe"], prints["used"], prints["first"] = shoe, 1, since
     cost, one = np.full((1, 1), 11.0), np.zeros(1, np.int64)
-    goes_on(clusters, one, prints, bodies, one, np.array([nobodys_at]), 5.0, cost)
+    goes_on(shows(clusters, prints, 5.0, 0), bodies, one, np.array([nobodys_at]), cost)
     assert bool(cost[0, 0] < 11.0) == costs_less
