@@ -16,8 +16,8 @@ from tms_agents.floor.state import pack, unpack
 Array = NDArray[np.float64]
 Places = deque[tuple[float, float]]
 
-#: So near a gate (m) people come; who is lost so near one has gone.
-_DOOR_M, _GONE_M = 1.0, 0.3
+#: So near a gate that is told (m), or where others came, people come; who is lost so near a gate has gone.
+_GATE_M, _DOOR_M, _GONE_M = 0.7, 1.0, 0.3
 #: So near (m) the edge of what is seen somebody may go out of sight; by the way he came if that is so near (m).
 _EDGE_M, _WAY_M = 0.5, 1.7
 #: Who comes in where nothing tells that sight ends is hardly seen there: so near (m) others go out.
@@ -68,13 +68,13 @@ class Doors:
     def inside(self, x: float, y: float) -> bool:
         """Whether whoever begins to be seen at (x, y) m has not come in by a door, as far as doors are known."""
         if self.told:
-            return self._gates.distance(x, y) >= _DOOR_M
+            return self._gates.distance(x, y) >= _GATE_M
         return self.known and not self._leads_out(x, y)
 
     def enters(self, x: float, y: float) -> bool:
         """Whether whoever begins to be seen at (x, y) m has come in by a door that is told or where others came."""
         if self.told:
-            return self._gates.distance(x, y) < _DOOR_M
+            return self._gates.distance(x, y) < _GATE_M
         return from_edge(self._edges, x, y) < _EDGE_M and _nearest(self._ways, x, y, math.inf) < _DOOR_M
 
     def _leads_out(self, x: float, y: float) -> bool:

@@ -81,7 +81,8 @@ def test_told_gates_are_all_there_are() -> None:
     told.came(5.9, 0.0, alone=True)
     assert told.known and told.told
     assert told.keeps(lost(5.9)) and told.inside(5.9, 0.0)
-    assert not told.keeps(lost(0.6)) and told.enters(1.2, 0.0) and not told.enters(1.6, 0.0)
+    assert not told.keeps(lost(0.6)) and told.enters(1.1, 0.0) and not told.enters(1.3, 0.0)
+    assert told.inside(1.3, 0.0) and not told.inside(1.1, 0.0)
 
 
 def test_it_outlives_a_restart(doors: Doors) -> None:

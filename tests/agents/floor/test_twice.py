@@ -97,7 +97,7 @@ def test_nor_may_he_be_who_has_stood_there_for_long(landed_s: float, suspected: 
 
 
 def test_who_comes_in_by_a_door_is_not() -> None:
-    one = room([DOOR])
+    one = room([[(x - 0.3, y) for x, y in DOOR]])
     stander(one.bodies[0], NOW - 1.5, x=6.6, ax=6.6, bx=6.6, rest_x=6.6, told_x=6.6)
     comer(one.bodies[1], 7.6, 1.0, NOW - 1.0)
     assert [type(event) for event in at(one, NOW)] == [Appeared]
