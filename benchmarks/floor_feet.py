@@ -26,7 +26,7 @@ from floor_told import Explained, Job, Told
 
 from tms_agents.floor.build import SHOES
 from tms_agents.floor.landing import landing
-from tms_agents.floor.likelihood import UNLIKELY
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.settings import Polygon
 from tms_agents.simulation.floor_world import LASERS, SCENARIOS
 

@@ -19,8 +19,8 @@ from tms_agents.floor.assignment import assign
 from tms_agents.floor.association import Association
 from tms_agents.floor.bodies import predict
 from tms_agents.floor.clustered import ClusteredScan
-from tms_agents.floor.likelihood import UNLIKELY
 from tms_agents.floor.nobodys import costs, known
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.settings import Polygon
 from tms_agents.floor.shine import scatter
 from tms_agents.simulation.floor_world import LASERS, FloorWorld

@@ -29,8 +29,9 @@ from scipy.optimize import minimize
 from tms_agents.floor.bodies import narrow
 from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.fitted import LEGS, SHOES, Legs, Shoes
-from tms_agents.floor.likelihood import UNLIKELY, feet_by
+from tms_agents.floor.likelihood import feet_by
 from tms_agents.floor.missing import missed
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.settings import Polygon
 from tms_agents.simulation.floor_world import LASERS, SCENARIOS
 

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from tms_agents.floor.assignment import assign
 from tms_agents.floor.bodies import begin, narrow, together, update
 from tms_agents.floor.clustered import ClusteredScan
-from tms_agents.floor.likelihood import UNLIKELY, too_wide
+from tms_agents.floor.likelihood import too_wide
 from tms_agents.floor.missing import expect, missed, out_of_reach
 from tms_agents.floor.nobodys import costs
 from tms_agents.floor.norm import norm
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.shine import learn
 
 Array = NDArray[np.float64]

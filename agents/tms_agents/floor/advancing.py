@@ -16,6 +16,7 @@ from tms_agents.floor.identity import unite
 from tms_agents.floor.proposing import WORSE, Children, propose
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @njit(cache=True)
@@ -36,23 +37,16 @@ def advance(
     The best is the first. ``scattered`` (3,) is what `shine.scatter` has learned; ``sight`` and ``seats`` as `missed`
     takes them. ``taken`` (m,) becomes which clusters are somebody's in the best. What was in ``now`` is overwritten.
     """
-    # Here as in all kernels: to take a field of a tuple costs as much as to read ten numbers.
-    before, raw, of, t = now.bodies, now.raw, scan.of, scan.t
+    # Out of the loops: whenever a field of a tuple is taken, its users are counted.
+    before, of, t = now.bodies, scan.of, scan.t
     kept_most, n, m = before.shape[0], before.shape[1], scan.clusters.size
     most = count * (m + 1)
     child_score, child_parent, child_columns = np.empty(most), np.empty(most, np.int64), np.full((most, m), -1)
     children = Children(child_score, child_parent, child_columns)
-    first, alike, top = np.empty((count, n), np.int64), np.empty((count, n), np.int64), 0
-    for h in range(count):
-        predict(before[h], t)
-        for b in range(n):
-            if before[h, b].used:
-                top = max(top, b + 1 if before[h, b].confirmed else 0)
-                g = first_like(raw, ALL, h, b)
-                first[h, b] = g
-                alike[h, b] = alike[g, b] if g < h else first_like(raw, FEET, h, b)
+    first, alike = np.empty((count, n), np.int64), np.empty((count, n), np.int64)
+    top = _compare(now, t, first, alike)
     many = propose(now, alike, top, scores, scan, children)
-    rows, other_of, scratch = np.empty(n, np.int64), np.empty(n, np.int64), np.empty((2, n))
+    rows, scratch = np.empty(n, np.int64), np.empty((2, n))
     owned, free = np.zeros((kept_most, max(m, 1)), np.bool_), np.ones(m, np.bool_)
     order = np.argsort(child_score[:many])
     pool.last[:] = -1
@@ -85,14 +79,7 @@ def advance(
                 nobodys_at[of[i]] = t
         complete(bodies, scan, free, sight)
         score = child_score[o] - least + unseen
-        known_already = False
-        for j in range(kept):
-            if same_places(after.bodies[j], bodies, top, other_of):
-                worse = score - scores[j]
-                unite(after.bodies[j], after.beliefs[j], bodies, beliefs, other_of, worse, scattered, scratch)
-                known_already = True
-                break
-        if known_already:
+        if _united(after, kept, top, score, scores, scattered, scratch):
             continue
         for i in range(m):
             owned[kept, i] = not free[i]
@@ -106,3 +93,38 @@ def advance(
     for i in range(m):
         taken[i] = owned[best, i]
     return kept
+
+
+@njit(cache=True)
+def _compare(now: Hypotheses, t: float, first: Integers, alike: Integers) -> int:
+    """Move everybody to the time t; how many of the bodies may be believed: those that are, are the first.
+
+    Fills in which hypothesis each body was exactly the same ``first`` (count, n), and in which ``alike`` (count, n): in
+    all that has to do with whose foot a cluster is.
+    """
+    bodies, raw = now.bodies, now.raw
+    top = 0
+    for h in range(first.shape[0]):
+        predict(bodies[h], t)
+        for b in range(bodies.shape[1]):
+            if bodies[h, b].used:
+                top = max(top, b + 1 if bodies[h, b].confirmed else 0)
+                g = first_like(raw, ALL, h, b)
+                first[h, b] = g
+                alike[h, b] = alike[g, b] if g < h else first_like(raw, FEET, h, b)
+    return top
+
+
+@njit(cache=True)
+def _united(
+    after: Hypotheses, last: int, top: int, score: float, scores: Array, scattered: Array, scratch: Array
+) -> bool:
+    """Whether the ``last`` hypothesis is one that was kept before, but for who is who: then that one doubts it now."""
+    bodies, beliefs = after.bodies, after.beliefs
+    of = np.empty(bodies.shape[1], np.int64)
+    for j in range(last):
+        if same_places(bodies[j], bodies[last], top, of):
+            worse = score - scores[j]
+            unite(bodies[j], beliefs[j], bodies[last], beliefs[last], of, worse, scattered, scratch)
+            return True
+    return False

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tms_agents.floor.bodies import STAND_M, WIDE_M, narrow, scant
 from tms_agents.floor.build import LONGEST_SHOE_M, SHOES
 from tms_agents.floor.clustered import ClusteredScan
-from tms_agents.floor.likelihood import FRESH_S, LEG_M, UNLIKELY, feet, too_wide, waits
+from tms_agents.floor.likelihood import LEG_M, feet, too_wide, waits
 from tms_agents.floor.norm import norm
+from tms_agents.floor.one_foot import FRESH_S, UNLIKELY
 from tms_agents.floor.prints import thin
 from tms_agents.floor.segmentation import BRIDGE
 

@@ -12,8 +12,9 @@ from tms_agents.floor.adopting import chosen
 from tms_agents.floor.assignment import reassign, solve, work
 from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.hypotheses import Hypotheses
-from tms_agents.floor.likelihood import UNLIKELY, feet
+from tms_agents.floor.likelihood import feet
 from tms_agents.floor.nobodys import goes_on, known, nobodys, spanned
+from tms_agents.floor.one_foot import UNLIKELY
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -11,6 +11,7 @@ from tms_agents.floor import FloorEstimator, Sensor, association, likelihood
 from tms_agents.floor.association import Association
 from tms_agents.floor.clustered import ClusteredScan
 from tms_agents.floor.hypotheses import BESIDES
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.simulation.floor_world import FloorWorld
 
 
@@ -47,7 +48,7 @@ def test_whose_foot_it_is_has_nothing_to_do_with_the_rest(feet: Any, monkeypatch
             likelihood.feet(scan, free, bodies, row, one)
             likelihood.feet(scan, free, other, row, two)
             np.testing.assert_array_equal(one, two)
-            compared[0] += int((one < likelihood.UNLIKELY).sum())
+            compared[0] += int((one < UNLIKELY).sum())
         return plain(self, scan, sight)
 
     monkeypatch.setattr(Association, "step", step)

@@ -17,10 +17,11 @@ from tms_agents.floor.association import Association
 from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.bodies import narrow
 from tms_agents.floor.events import Back, Moved, Stale
-from tms_agents.floor.likelihood import UNLIKELY, feet
+from tms_agents.floor.likelihood import feet
 from tms_agents.floor.masks import Area, Masks, joined
 from tms_agents.floor.missing import missed
 from tms_agents.floor.nobodys import costs
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.review import CONFIRM, NOTHING, THING, Waits, review
 from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
 from tms_agents.floor.silence import vacant

@@ -10,8 +10,9 @@ from floor_prints import NOW, resting, shows
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, Scene
-from tms_agents.floor.likelihood import UNLIKELY, too_wide
+from tms_agents.floor.likelihood import too_wide
 from tms_agents.floor.nobodys import costs, known, nobodys
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.patience import brings
 from tms_agents.floor.prints import attend
 from tms_agents.floor.putting import count_feet, set_aside

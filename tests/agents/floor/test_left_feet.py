@@ -10,7 +10,8 @@ from floor_prints import shows
 
 from tms_agents.floor import FloorEstimator, Scene, Sensor
 from tms_agents.floor.left_feet import take_back
-from tms_agents.floor.likelihood import UNLIKELY, feet
+from tms_agents.floor.likelihood import feet
+from tms_agents.floor.one_foot import UNLIKELY
 from tms_agents.floor.prints import attend
 from tms_agents.floor.segmentation import CLUSTER
 from tms_agents.floor.shine import expected

@@ -17,7 +17,7 @@ from tms_agents.floor.tracks import Tracks
 
 NOW = 100.0
 ROOM = [(0.0, -4.0), (9.0, -4.0), (9.0, 4.0), (0.0, 4.0)]
-DOOR = [(8.5, 1.0), (9.5, 1.0), (9.5, 2.0), (8.5, 2.0)]
+DOOR = [(8.2, 1.0), (9.5, 1.0), (9.5, 2.0), (8.2, 2.0)]
 #: A laser at the origin that looks along x and sees walls 8 m away.
 OPEN = (np.full(101, 8.0), np.full(101, BACKGROUND, np.int8), np.full(101, 8.0), np.zeros(3), -0.5, 0.01)
 
