@@ -21,6 +21,7 @@ from tms_agents.floor.fusion import Extrinsics
 from tms_agents.floor.left_feet import take_back
 from tms_agents.floor.masks import Area, Masks
 from tms_agents.floor.objects import Objects
+from tms_agents.floor.outlook import Outlook
 from tms_agents.floor.own_feet import exchange
 from tms_agents.floor.patience import brings, has_left
 from tms_agents.floor.prints import attend, follow
@@ -30,7 +31,6 @@ from tms_agents.floor.robots import gather, recognize, sizes
 from tms_agents.floor.segmentation import backed
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
 from tms_agents.floor.shine import measure, note
-from tms_agents.floor.sight import edges_of_sight, looks_past
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
 from tms_agents.floor.strays import release
 from tms_agents.floor.tracks import Tracks
@@ -49,8 +49,6 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: So often (s) it is looked how far the lasers see, where no gates are told.
-_LOOKS_S = 2.0
 #: Of saved states; 18: for how long who stays is thinner than feet, and how often feet land.
 _FORMAT = 18
 
@@ -75,6 +73,7 @@ class FloorEstimator:
         self._association = Association(_BODIES, _PRINTS, self._scene.seats)
         self._shoes = legs()
         self._tracks = Tracks(self._association, self._settings, self._scene)
+        self._outlook = Outlook(self._scene, self._tracks.absent.doors)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
         self._footprints = Footprints(self._scene.robots, self._gates, self._association)
@@ -110,8 +109,7 @@ class FloorEstimator:
         if background.ready:
             events = self._understand(view, states, t, dt, _lights(intensities, view.n))
         background.learn(view.ranges, view.claimed, dt)
-        if not self._tracks.absent.doors.told and t // _LOOKS_S > (t - dt) // _LOOKS_S:
-            self._look_round()
+        self._outlook.look(list(self._views.values()), t, dt)
         return events
 
     def labels(self) -> list[FloorLabel]:
@@ -192,19 +190,6 @@ class FloorEstimator:
         self._association.settle()
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared
-
-    def _look_round(self) -> None:
-        """How far all lasers see, once they know the room."""
-        views = list(self._views.values())
-        if not all(view.background.learned for view in views):
-            return
-        edges = []
-        for view in views:
-            mine = edges_of_sight(*view.reach)
-            for other in views:
-                mine = mine if other is view else mine[~looks_past(mine, *other.reach)]
-            edges.append(mine)
-        self._tracks.absent.doors.see(np.concatenate(edges))
 
     def _pieces(self, t: float) -> list[Piece]:
         return [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]

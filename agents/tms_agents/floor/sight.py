@@ -46,6 +46,13 @@ def looks_past(edges: Array, ranges: Array, reach: float, angles: Array, pose: A
     return np.asarray(far > np.hypot(*middle.T) + _BEYOND_M)
 
 
+def beams(ranges: Array, reach: float, angles: Array, pose: Array) -> Array:
+    """The segments (n, 4), x, y, x, y m, on which the laser sees feet in the empty room; all as above."""
+    far, turned = np.minimum(ranges, reach - _FAINT_M), angles + pose[2]
+    ends = pose[:2] + far[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=1)
+    return np.hstack([np.broadcast_to(pose[:2], ends.shape), ends])
+
+
 def _pieces(a: Array, b: Array) -> Array:
     """The way from a to b (2,) in pieces (k, 4)."""
     count = max(1, round(norm(*(b - a)) / _PIECE_M))

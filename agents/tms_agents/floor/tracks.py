@@ -61,6 +61,8 @@ _OUT_M, _SPEED = 0.5, 0.9
 _THROUGH_S = 0.6
 #: Who is seen so far (m) outside the region has left the room; who comes is told when he is no farther (m) from it.
 _OUTSIDE_M, _INSIDE_M = 0.1, 0.05
+#: Nobody sits for so long (s).
+_SITS_S = 86400.0
 #: Who sits does so this far (m) from the edge of the seat, and for certain, if his feet have vanished in clear view for
 #: so long (s).
 _DEEP_M, _CLEAR_S = 0.25, 0.3
@@ -178,9 +180,10 @@ class Tracks:
 
     def _gone(self, index: int, t: float) -> list[FloorEvent]:
         body = self.bodies[index]
-        if t - body["seen"] < (
-            86400.0 if self._where.seated(body) else self._settings.hidden_s if self._where.masked(body) else 0.0
-        ):
+        hidden_s = self._settings.hidden_s if self._where.masked(body) else 0.0
+        if self._where.seated(body) and not self.absent.doors.out_of_sight(body):
+            hidden_s = _SITS_S
+        if t - body["seen"] < hidden_s:
             body["clear"] = 0.0
             return self._lost(index, t)
         self._association.forget(index)
@@ -222,7 +225,7 @@ class Tracks:
         body = self.bodies[index]
         if body["stale"]:
             return []
-        seated = self._where.sits(body)
+        seated = self._where.sits(body) and not self.absent.doors.out_of_sight(body)
         walled = bool(self._region.polygons) and self._region.distance(float(body["x"]), float(body["y"])) > 0.0
         if seated or (walled and not self._where.leaves(body)):
             # Who has sat down, or would have gone through a wall, has not gone on the way he went.
