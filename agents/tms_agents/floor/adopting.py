@@ -78,7 +78,7 @@ def adopt_from(
     Whoever was the same (``first`` (n,): in that hypothesis) and has taken the same feet before is copied from the
     ``pool``, in which so many are ``pooled``: how many are now, and what `missed`, which takes ``seats``, finds of all.
     """
-    taken_by, known, misses, last = pool.bodies, pool.taken, pool.misses, pool.last
+    there, known, misses, last = pool.bodies, pool.taken, pool.misses, pool.last
     feet, unseen = _feet_of(columns, rows.size, free), 0.0
     for column in range(rows.size):
         row, a, b = rows[column], feet[2 * column], feet[2 * column + 1]
@@ -86,15 +86,15 @@ def adopt_from(
         while found >= 0 and not (known[found, 0] == first[row] and known[found, 1] == a and known[found, 2] == b):
             found = known[found, 3]
         if found >= 0:
-            bodies[row] = taken_by[found]
+            bodies[row] = there[found]
             unseen += misses[found]
             continue
         bodies[row] = parent[row]
         _take(bodies[row], a, b, scan, sight)
         miss = missed(bodies[row], scan.t, sight, seats)
         unseen += miss
-        if pooled < taken_by.size:
-            taken_by[pooled], misses[pooled] = bodies[row], miss
+        if pooled < there.size:
+            there[pooled], misses[pooled] = bodies[row], miss
             known[pooled, 0], known[pooled, 1], known[pooled, 2], known[pooled, 3] = first[row], a, b, last[row]
             last[row] = pooled
             pooled += 1

@@ -39,7 +39,7 @@ def propose(now: Hypotheses, alike: Integers, top: int, scores: Array, scan: Clu
     hypothesis each body was the same first, for `feet`: most people are the same in all. All who are believed are among
     the first ``top``.
     """
-    score, parent, of = children.score, children.parent, children.columns
+    score, parent, ways = children.score, children.parent, children.columns
     count, n, m = alike.shape[0], now.bodies.shape[1], scan.clusters.size
     rows = np.empty(n, np.int64)
     everything, columns, other = np.ones(m, np.bool_), np.empty(m, np.int64), np.empty(m, np.int64)
@@ -71,7 +71,7 @@ def propose(now: Hypotheses, alike: Integers, top: int, scores: Array, scan: Clu
         least = min(least, scores[h] + best)
         # What is worse is given up anyway.
         most = min(_BRANCH, least + WORSE - scores[h] - best)
-        of[many] = columns
+        ways[many] = columns
         many += 1
         for i in range(m):
             if columns[i] >= 2 * k:
@@ -79,6 +79,6 @@ def propose(now: Hypotheses, alike: Integers, top: int, scores: Array, scan: Clu
             total = reassign(cost, columns, i, columns[i] // 2 * 2, 1.01 * most, other, solved)
             if total - best < most:
                 score[many], parent[many] = scores[h] + total, h
-                of[many] = other
+                ways[many] = other
                 many += 1
     return many
