@@ -29,7 +29,8 @@ _MOST = 200
 
 
 class Doors:
-    """The ``gates``; where none is told, the edges of what is seen, and by which of them people have come."""
+    """The ``gates``, and how far from them sight ends; where none is told, the edges of what is seen, and by which of
+    them people have come."""
 
     def __init__(self, gates: Area) -> None:
         self._gates = gates

@@ -39,7 +39,7 @@ _LEVEL = 6.5
 
 
 class Way(NamedTuple):
-    """What `lands` needs of a body, whichever shoe it is: to work it out for each takes longer than all the rest.
+    """What `lands` needs of a body, whichever shoe and cluster it is: worked out once.
 
     Its speed (m/s) and heading; variances (m²) of where its shoes land, along and aside and around it, and of the
     length of its step; the logarithms of what norms them.

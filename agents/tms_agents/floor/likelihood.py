@@ -94,7 +94,7 @@ def _foot(
     cost: Array,
 ) -> None:
     """Lower ``cost`` (2,) to that of the cluster c, on ``print_`` (-1: none), being the first and the second foot."""
-    # Not the whole scan: to hand it over for each cluster takes longer than all the rest.
+    # Not the whole scan: it would be handed over anew for each cluster.
     q = prints[print_] if print_ >= 0 else prints[0]
     age = t - q.first if print_ >= 0 else 0.0
     if not _possible(c, q, print_ >= 0, age, body, t):
