@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.bodies import narrow
+from tms_agents.floor.build import SHOES
 from tms_agents.floor.norm import norm
 from tms_agents.floor.segmentation import CLUSTER
 
@@ -31,6 +33,9 @@ _LAY_S, _LAST_S = 1.0, 0.45
 _FEET_M = (0.06, 0.7)
 #: A print so near (m) may be the other foot of somebody who is not known yet.
 _PAIR_M = 0.45
+#: The next step comes so soon (s) after the one before, and so far (m) from it; what is slimmer (m), all of it in view,
+#: is no foot.
+_NEXT_S, _NEXT_M, _SLIM_M = 1.5, (0.2, 1.2), 0.07
 #: What has been nobody's for so long (s), and for such a share of the time, is a thing if it is so wide (m) at most.
 _IDLE_S, _IDLE, _THING_M = 3.0, 0.7, 0.25
 #: What flickers at its edge is so wide (m) at most, and so near it (m).
@@ -66,6 +71,34 @@ def _put(c: Any, j: int, prints: Any, bodies: Any, t: float) -> bool:
         elif away < _OTHER_M:
             return False
     return giver >= 0
+
+
+@njit(cache=True)
+def _walks(c: Any, j: int, prints: Any, t: float) -> bool:
+    """Whether the cluster with the new print j is the next step of somebody unknown, whose first seemed to be put down.
+
+    No hand puts two things down so fast and so far apart. What was taken for a thing may be a foot again. It is so of
+    shoes: a leg is seen all the way from one step to the next.
+    """
+    if narrow(c):
+        return False
+    walks = False
+    for i in range(prints.size):
+        q = prints[i]
+        new = i != j and q.used and q.whose < 0 and t - q.rested < _NEXT_S
+        slim = q.whole == q.hits and q.width < _SLIM_M
+        if new and not slim and _NEXT_M[0] < norm(c.x - q.x, c.y - q.y) < _NEXT_M[1]:
+            q.given, walks = 0, True
+    return walks
+
+
+@njit(cache=True)
+def _shod(bodies: Any) -> bool:
+    """Whether any of the bodies (n,) shows shoes."""
+    shod = False
+    for b in range(bodies.size):
+        shod = shod or (bodies[b].used and bodies[b].shoe >= SHOES)
+    return shod
 
 
 @njit(cache=True)
@@ -150,7 +183,7 @@ def _set_aside(
                 q.given = 0
             new = t - q.first <= _NEW_S and q.owner < 0 and q.hits < 3 and clusters[k].width < width_m
             if new and not q.given and _put(clusters[k], of[k], prints, bodies, t):
-                q.given = 1
+                q.given = not (_shod(bodies) and _walks(clusters[k], of[k], prints, t))
             thing = q.given == 1
         if not thing:
             k += 1

@@ -112,6 +112,35 @@ def test_what_appears_beside_who_stands_on_both_feet_was_put_there(other: dict[s
     assert prints["given"][4] == given
 
 
+@pytest.mark.parametrize(
+    ("ago_s", "away", "before", "width", "shoe", "given"),
+    [
+        (0.7, 0.6, 0.2, 0.1, 1.0, 0),
+        (2.0, 0.6, 0.2, 0.1, 1.0, 1),  # the next step comes sooner
+        (0.7, 0.15, 0.2, 0.1, 1.0, 1),  # and is longer
+        (0.7, 1.4, 0.2, 0.1, 1.0, 1),  # but not so long
+        (0.7, 0.6, 0.05, 0.1, 1.0, 1),  # what came before is too slim for a foot
+        (0.7, 0.6, 0.2, 0.01, 1.0, 1),  # or what comes now
+        (0.7, 0.6, 0.2, 0.1, 0.0, 1),  # legs are seen between two steps
+    ],
+)
+def test_two_steps_past_who_stands_are_nothing_that_he_has_put_down(
+    ago_s: float, away: float, before: float, width: float, shoe: float, given: int
+) -> None:
+    """Whoever comes in unseen behind somebody who stands was two things beside him."""
+    bodies, prints = crowd()
+    bodies["shoe"] = shoe
+    prints["owner"][:4] = 0
+    first = resting(ago_s, width=before, given=1, whole=8, hits=8)
+    first["x"] = -away
+    prints = np.concatenate([prints, first])
+    prints["whose"] = [1, 1, 2, 2, -1, -1]
+    clusters = np.zeros(1, CLUSTER)
+    clusters["width"], clusters["n"] = width, 8
+    set_aside(clusters, np.full(1, 4, np.int64), prints, bodies, 0.3, NOW)
+    assert prints["given"][4] == prints["given"][5] == given
+
+
 @pytest.mark.parametrize(("b_print", "counted"), [(-1, 1.0), (3, 0.0)])
 def test_somebody_new_who_is_only_what_lies_there_is_no_reason_to_wait(b_print: int, counted: float) -> None:
     bodies, prints = crowd(confirmed=0, x=0.0, a_print=4, b_print=b_print)
