@@ -106,4 +106,6 @@ def _costs(x: Array, data: _Data) -> Array:
     value = np.logaddexp(goes_on, turns)
     value += np.logaddexp(length, n["_ANY_STEP"]) * np.minimum(speed / landing._STEPS, 1.0)
     value += np.interp(up, landing._UP_S, n["_UP"]) + np.interp(other, landing._OTHER_S, n["_OTHER"])
+    stands = (other > landing._LONG_S) & (other < landing._NEVER_S)
+    value -= np.log(np.where(stands, other / landing._LONG_S, 1.0))
     return np.asarray(landing._LEVEL - value + data.extra)

@@ -25,6 +25,9 @@ _UP = np.array([-0.73, -1.51, -1.24, -1.38, -1.17, 0.95, 1.06, 1.53, 0.85, 0.97,
 #: The same by how long ago (s) the other one has landed.
 _OTHER_S = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.5, 3.0])
 _OTHER = np.array([0.0, 0.81, -0.69, -1.35, -0.59, 0.25, 0.77, 0.52, -0.11, 0.03, 0.54, -0.17])
+#: That is fitted up to so long (s). Who has stood twice as long sets off half as often in one scan, and so on: so it is
+#: where some stand for seconds and some for minutes. Longer than this (s) is never: no other one has landed.
+_LONG_S, _NEVER_S = 3.0, 1e6
 #: It lands so far (m) ahead of the body, farther ahead by so much per m/s and per m that the other one is behind.
 _AHEAD_M, _PER_SPEED, _PER_LAG = -0.02, 0.26, 0.27
 #: Who goes on as he went: standard deviation (m) along and aside, and how much what is not known of the body counts.
@@ -89,7 +92,10 @@ def lands(body: Any, goes: Way, c: Any, ox: float, oy: float, seen: float, other
     turns = _TURNS - 0.5 * (ahead * ahead + aside * aside) / goes.around - goes.log_around
     length = -0.5 * ((step - body.stride) ** 2 / goes.lengths + goes.log_lengths)
     value = np.logaddexp(goes_on, turns) + np.logaddexp(length, _ANY_STEP) * min(goes.speed / _STEPS, 1.0)
-    return float(_LEVEL - value - _read(since - seen, _UP_S, _UP) - _read(since - other, _OTHER_S, _OTHER))
+    value += _read(since - seen, _UP_S, _UP) + _read(since - other, _OTHER_S, _OTHER)
+    if _LONG_S < since - other < _NEVER_S:
+        value -= np.log((since - other) / _LONG_S)
+    return float(_LEVEL - value)
 
 
 @njit(cache=True)

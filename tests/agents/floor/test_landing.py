@@ -24,17 +24,26 @@ def walker(heading: float = 0.0, speed: float = 1.0, unsure: float = 0.01):
     return body
 
 
-def price(body, ahead: float, aside: float = 0.0, heading: float = 0.0, *, up: float = 0.45, age: float = 0.0) -> float:
+def price(
+    body,
+    ahead: float,
+    aside: float = 0.0,
+    heading: float = 0.0,
+    *,
+    up: float = 0.45,
+    age: float = 0.0,
+    stood: float = 0.5,
+) -> float:
     """What it costs that a shoe so far from the body is its other foot, up for so long.
 
-    The first was under the body when the shoe landed, ``age`` s ago.
+    The first was under the body, and had ``stood`` for so long (s), when the shoe landed, ``age`` s ago.
     """
     shoe = np.zeros(1, CLUSTER)[0]
     shoe["x"] = ahead * math.cos(heading) - aside * math.sin(heading)
     shoe["y"] = ahead * math.sin(heading) + aside * math.cos(heading)
     since = T - age
     ox, oy = -age * float(body["vx"]), -age * float(body["vy"])
-    return float(landing(body, shoe, ox, oy, since - up, since - 0.5, since))
+    return float(landing(body, shoe, ox, oy, since - up, since - stood, since))
 
 
 def test_who_walks_puts_his_shoe_before_him_not_behind_him_or_far_aside() -> None:
@@ -75,3 +84,15 @@ def test_it_is_a_number_and_the_same_from_every_side(
 def test_what_landed_some_scans_ago_is_judged_by_where_he_was_then() -> None:
     assert price(walker(), 0.25) == pytest.approx(price(walker(), 0.05, age=0.2), abs=1e-9)
     assert price(walker(), 0.05, age=0.2) < price(walker(), 0.45, age=0.2) - 1.0
+
+
+@pytest.mark.parametrize("stood", [3.0, 6.0, 24.0])
+def test_who_has_stood_twice_as_long_sets_off_half_as_often(stood: float) -> None:
+    standing = walker(speed=0.0)
+    once, twice = (price(standing, 0.25, stood=seconds) for seconds in (stood, 2.0 * stood))
+    assert twice - once == pytest.approx(math.log(2.0))
+
+
+def test_who_shows_one_foot_alone_has_not_stood_on_the_other_for_ever() -> None:
+    standing = walker(speed=0.0)
+    assert price(standing, 0.25, stood=1e9) == price(standing, 0.25, stood=3.0)
