@@ -75,7 +75,7 @@ def _put(c: Any, j: int, prints: Any, bodies: Any, t: float) -> bool:
 
 @njit(cache=True)
 def _walks(c: Any, j: int, prints: Any, t: float) -> bool:
-    """Whether the cluster with the new print j is the next step of somebody unknown, whose first seemed to be put down.
+    """Whether the cluster with the new print j is the next step of somebody unknown, after one that is nobody's.
 
     No hand puts two things down so fast and so far apart. What was taken for a thing may be a foot again. It is so of
     shoes: a leg is seen all the way from one step to the next.
