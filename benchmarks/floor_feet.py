@@ -1,7 +1,7 @@
 """Whose foot is it: how often the costs of an assignment favour the owner of a foot that lands near others.
 
     python benchmarks/floor_feet.py                          share of landings that are likeliest their owner's
-    python benchmarks/floor_feet.py --fit                    and fits the numbers of `tms_agents.floor.landing` again
+    python benchmarks/floor_feet.py --fit                    and fits the numbers of `feet.landing` again
     python benchmarks/floor_feet.py --seeds 2001-2064 --scenes "three,three close" --laser coarse
 
 The estimator plays simulated rooms and is told whose each foot was, after it has said what it would cost to be whose:
@@ -17,16 +17,15 @@ import argparse
 import math
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from floor_landing import fit
+from floor_landing import Candidate, Choice, fit
 from floor_told import Explained, Job, Told
 
-from tms_agents.floor.build import SHOES
-from tms_agents.floor.landing import landing
-from tms_agents.floor.one_foot import UNLIKELY
+from tms_agents.floor.feet.build import SHOES
+from tms_agents.floor.feet.landing import landing
+from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.settings import Polygon
 from tms_agents.simulation.floor_world import LASERS, SCENARIOS
 
@@ -34,34 +33,6 @@ from tms_agents.simulation.floor_world import LASERS, SCENARIOS
 _NEAR_M = 1.3
 #: A cluster is fresh for so long (s).
 _FRESH_S = 0.05
-
-
-@dataclass(slots=True)
-class Candidate:
-    """One who may have put down a foot: what that costs, of which ``extra`` does not come from where he is and when.
-
-    Of a shoe that lands: ahead of the body, aside, from the other foot (m), speed (m/s), variance (m²), usual stride
-    (m), for how long the shoe was up and the other one stands (s).
-    """
-
-    cost: float
-    extra: float
-    owner: bool
-    lands: bool
-    shoe: bool
-    state: tuple[float, ...] = ()
-
-
-@dataclass(slots=True)
-class Choice:
-    """A foot that has appeared, and who may have put it down."""
-
-    seed: int
-    candidates: list[Candidate] = field(default_factory=list)
-
-    @property
-    def right(self) -> bool:
-        return min(self.candidates, key=lambda one: one.cost).owner
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

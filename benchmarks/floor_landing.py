@@ -1,17 +1,15 @@
-"""The fit of `tms_agents.floor.landing`: a conditional logit model of whose shoe has landed (McFadden 1974)."""
+"""The fit of `tms_agents.floor.feet.landing`: a conditional logit model of whose shoe has landed (McFadden 1974)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from tms_agents.floor import landing
-
-if TYPE_CHECKING:
-    from floor_feet import Choice
+from tms_agents.floor.feet import landing
 
 Array = NDArray[np.float64]
 
@@ -21,6 +19,34 @@ _POSITIVE = ("_ALONG_M", "_ALONG_MORE", "_ASIDE_M", "_ASIDE_MORE", "_TURNS_M", "
 _KEPT_ASIDE = 4
 #: Tables are pulled to what they were: where nobody lands nothing is learned.
 _PULL = 1e-4
+
+
+@dataclass(slots=True)
+class Candidate:
+    """One who may have put down a foot: what that costs, of which ``extra`` does not come from where he is and when.
+
+    Of a shoe that lands: ahead of the body, aside, from the other foot (m), speed (m/s), variance (m²), usual stride
+    (m), for how long the shoe was up and the other one stands (s).
+    """
+
+    cost: float
+    extra: float
+    owner: bool
+    lands: bool
+    shoe: bool
+    state: tuple[float, ...] = ()
+
+
+@dataclass(slots=True)
+class Choice:
+    """A foot that has appeared, and who may have put it down."""
+
+    seed: int
+    candidates: list[Candidate] = field(default_factory=list)
+
+    @property
+    def right(self) -> bool:
+        return min(self.candidates, key=lambda one: one.cost).owner
 
 
 class _Data:

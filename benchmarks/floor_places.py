@@ -1,4 +1,4 @@
-"""Where somebody is, by his feet: fits the numbers of `tms_agents.floor.place`, and what they are worth.
+"""Where somebody is, by his feet: fits the numbers of `tms_agents.floor.feet.place`, and what they are worth.
 
     python benchmarks/floor_places.py
     python benchmarks/floor_places.py --fine 1400-1414 --coarse 2001-2012
@@ -20,8 +20,8 @@ import numpy as np
 from floor_contestants import Ours
 from numpy.typing import NDArray
 
-from tms_agents.floor.build import SHOES
-from tms_agents.floor.place import AGES_S, LONG_S, TERMS, known, place
+from tms_agents.floor.feet.build import SHOES
+from tms_agents.floor.feet.place import AGES_S, LONG_S, TERMS, known, place
 from tms_agents.simulation.floor_world import LASERS, FloorWorld
 
 Floats = NDArray[np.float64]

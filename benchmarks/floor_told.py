@@ -14,15 +14,15 @@ import numpy as np
 from floor_contestants import Ours
 from numpy.typing import NDArray
 
-from tms_agents.floor.adopting import adopt, complete
-from tms_agents.floor.assignment import assign
-from tms_agents.floor.association import Association
-from tms_agents.floor.bodies import predict
-from tms_agents.floor.clustered import ClusteredScan
-from tms_agents.floor.nobodys import costs, known
-from tms_agents.floor.one_foot import UNLIKELY
+from tms_agents.floor.association.adopting import adopt, complete
+from tms_agents.floor.association.assignment import assign
+from tms_agents.floor.association.association import Association
+from tms_agents.floor.feet.bodies import predict
+from tms_agents.floor.feet.nobodys import costs, known
+from tms_agents.floor.feet.one_foot import UNLIKELY
+from tms_agents.floor.feet.shine import scatter
+from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.settings import Polygon
-from tms_agents.floor.shine import scatter
 from tms_agents.simulation.floor_world import LASERS, FloorWorld
 
 #: Who begins to be followed so near (m) somebody is he.

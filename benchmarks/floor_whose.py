@@ -1,4 +1,4 @@
-"""Fits the numbers that the costs of feet are made of (`tms_agents.floor.fitted`).
+"""Fits the numbers that the costs of feet are made of (`tms_agents.floor.feet.fitted`).
 
     python benchmarks/floor_whose.py                 how likely the numbers in use make the right explanations
     python benchmarks/floor_whose.py --fit           and fits them again (ten minutes)
@@ -26,12 +26,12 @@ from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from tms_agents.floor.bodies import narrow
-from tms_agents.floor.clustered import ClusteredScan
-from tms_agents.floor.fitted import LEGS, SHOES, Legs, Shoes
-from tms_agents.floor.likelihood import feet_by
-from tms_agents.floor.missing import missed
-from tms_agents.floor.one_foot import UNLIKELY
+from tms_agents.floor.feet.bodies import narrow
+from tms_agents.floor.feet.fitted import LEGS, SHOES, Legs, Shoes
+from tms_agents.floor.feet.likelihood import feet_by
+from tms_agents.floor.feet.missing import missed
+from tms_agents.floor.feet.one_foot import UNLIKELY
+from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.settings import Polygon
 from tms_agents.simulation.floor_world import LASERS, SCENARIOS
 

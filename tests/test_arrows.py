@@ -30,6 +30,18 @@ ALLOWED: dict[str, set[str]] = {
     "tms_server/placement": {"tms_schemas", "tms_server/placement", "numpy", "numba", "pydantic"},
     "tms_migrations": {"tms_server", "alembic", "sqlalchemy", "pydantic"},
 }
+#: What the floor estimator consists of; each may import itself and those before it, and nothing that does I/O.
+FLOOR = ["scan", "feet", "association", "robots", "movers", "objects"]
+ALLOWED |= {
+    f"tms_agents/floor/{room}": {
+        *("numpy", "numba"),
+        *(
+            f"tms_agents/floor/{one}"
+            for one in ("norm", "state", "settings", "events", *FLOOR[: FLOOR.index(room) + 1])
+        ),
+    }
+    for room in FLOOR
+}
 
 
 def sources() -> Iterator[tuple[str, Path]]:

@@ -93,12 +93,12 @@ def test_feet_that_land_near_others_are_mostly_likeliest_their_owners(benchmark:
 
 def test_the_fit_begins_with_what_the_estimator_makes_of_a_landing(benchmark: Any) -> None:
     import floor_landing
-    from floor_feet import Choice, choices
+    from floor_feet import choices
     from floor_told import Job
 
     seen = [one for choice in choices(Job("three close", 1, "prints", "coarse"), 45.0) for one in choice.candidates]
     landed = [one for one in seen if one.lands]
-    pairs = [Choice(1, [replace(one, owner=True), replace(one, owner=False)]) for one in landed]
+    pairs = [floor_landing.Choice(1, [replace(one, owner=True), replace(one, owner=False)]) for one in landed]
     costs = floor_landing._costs(floor_landing._start(), floor_landing._Data(pairs))
     assert len(landed) > 30
     assert costs == pytest.approx(np.repeat([one.cost for one in landed], 2))
@@ -107,8 +107,7 @@ def test_the_fit_begins_with_what_the_estimator_makes_of_a_landing(benchmark: An
 def test_the_fit_makes_owners_likelier_than_the_numbers_it_begins_with(
     benchmark: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from floor_feet import Candidate, Choice
-    from floor_landing import fit
+    from floor_landing import Candidate, Choice, fit
 
     rng = np.random.default_rng(3)
     made = []
@@ -126,7 +125,7 @@ def test_the_fit_makes_owners_likelier_than_the_numbers_it_begins_with(
 def test_the_fit_of_places_finds_the_numbers_it_was_made_with(benchmark: Any) -> None:
     from floor_places import Samples, added, fit
 
-    from tms_agents.floor.place import TERMS
+    from tms_agents.floor.feet.place import TERMS
 
     rng = np.random.default_rng(4)
     n = 4000

@@ -71,7 +71,7 @@ def _cabinet(arguments: argparse.Namespace) -> int:
 
 def _floor(arguments: argparse.Namespace) -> int:
     try:
-        from tms_agents.floor.calibration_file import read_poses
+        from tms_agents.floor.calibration.poses import read_poses
         from tms_agents.floor.config import FloorConfig
         from tms_agents.floor.runner import run as run_floor
     except ImportError as error:

@@ -15,12 +15,12 @@ from tms_agents.clocks import Clocks
 from tms_agents.config import read_config
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.transport import DeviceState
-from tms_agents.floor.calibrating import by_walkers, by_walls, from_files, gather, outline_of
-from tms_agents.floor.calibration_file import LaserCalibration, read_poses, write_poses
+from tms_agents.floor.calibration.calibrating import by_walkers, by_walls, from_files, gather, outline_of
+from tms_agents.floor.calibration.poses import LaserCalibration, read_poses, write_poses
 from tms_agents.floor.config import FloorConfig, LaserSection
-from tms_agents.floor.formats import Recorded
 from tms_agents.floor.lasers import Laser
-from tms_agents.floor.recording import ScanWriter
+from tms_agents.floor.recordings.recorded import Recorded
+from tms_agents.floor.recordings.recording import ScanWriter
 from tms_agents.floor.runner import listen
 from tms_agents.live import socket_path, views
 from tms_agents.running import until_signalled

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from tms_agents.config import read_config
-from tms_agents.floor.calibration_file import read_poses
+from tms_agents.floor.calibration.poses import read_poses
 from tms_agents.floor.config import FloorConfig
-from tms_agents.floor.formats import Recorded, read_scans
-from tms_agents.floor.picture import tracks_png
-from tms_agents.floor.replay import Replay, tracks
+from tms_agents.floor.recordings.formats import read_scans
+from tms_agents.floor.recordings.recorded import Recorded
+from tms_agents.floor.recordings.replay import Replay, tracks
 from tms_agents.floor.settings import Pose
-from tms_agents.floor.watching import config_of, play
+from tms_agents.floor.watch.picture import tracks_png
+from tms_agents.floor.watch.watching import config_of, play
 from tms_client.cli import CommandError
 
 

@@ -16,10 +16,10 @@ from typing import Any
 from tms_agents.commands.floor_replay import poses_of, recordings_of
 from tms_agents.config import read_config
 from tms_agents.files import write_atomically
-from tms_agents.floor import watching
 from tms_agents.floor.config import FloorConfig
-from tms_agents.floor.picture import frame_of, png
-from tms_agents.floor.screen import screen
+from tms_agents.floor.watch import watching
+from tms_agents.floor.watch.picture import frame_of, png
+from tms_agents.floor.watch.screen import screen
 from tms_agents.live import socket_path
 from tms_agents.live import views as live_views
 from tms_agents.running import until_signalled

@@ -8,33 +8,33 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tms_agents.floor.association import Association
-from tms_agents.floor.background import FOREGROUND
-from tms_agents.floor.build import count_shoes, legs, only_legs
-from tms_agents.floor.clustered import ClusteredScan
-from tms_agents.floor.dark import dark_width
+from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import FloorEvent, FloorLabel
-from tms_agents.floor.footprints import Footprints
-from tms_agents.floor.freespace import LOOK, claim, guard, look
-from tms_agents.floor.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
-from tms_agents.floor.fusion import Extrinsics
-from tms_agents.floor.left_feet import take_back
-from tms_agents.floor.masks import Area, Masks
-from tms_agents.floor.objects import Objects
-from tms_agents.floor.outlook import Outlook
-from tms_agents.floor.own_feet import exchange
-from tms_agents.floor.patience import brings, has_left
-from tms_agents.floor.prints import attend, follow
-from tms_agents.floor.putting import count_feet, set_aside
-from tms_agents.floor.ripening import OBJECT, joins
-from tms_agents.floor.robots import gather, recognize, sizes
-from tms_agents.floor.segmentation import backed
+from tms_agents.floor.feet.build import count_shoes, legs, only_legs
+from tms_agents.floor.feet.left_feet import has_left, take_back
+from tms_agents.floor.feet.own_feet import exchange
+from tms_agents.floor.feet.prints import attend, follow
+from tms_agents.floor.feet.putting import count_feet, set_aside
+from tms_agents.floor.feet.shine import measure, note
+from tms_agents.floor.feet.strays import release
+from tms_agents.floor.movers.outlook import Outlook
+from tms_agents.floor.movers.tracks import Tracks
+from tms_agents.floor.objects.objects import Objects
+from tms_agents.floor.objects.patience import brings
+from tms_agents.floor.objects.ripening import OBJECT, joins
+from tms_agents.floor.robots.footprints import Footprints
+from tms_agents.floor.robots.recognizing import gather, recognize, sizes
+from tms_agents.floor.scan.background import FOREGROUND
+from tms_agents.floor.scan.clustered import ClusteredScan
+from tms_agents.floor.scan.dark import dark_width
+from tms_agents.floor.scan.freespace import LOOK, claim, guard, look
+from tms_agents.floor.scan.furniture import ADOPTED, LOOKS, MOVED, Furniture, Piece
+from tms_agents.floor.scan.fusion import Extrinsics
+from tms_agents.floor.scan.masks import Area, Masks
+from tms_agents.floor.scan.segmentation import backed
+from tms_agents.floor.scan.view import View
 from tms_agents.floor.settings import FloorSettings, Pose, Scene, Sensor
-from tms_agents.floor.shine import measure, note
 from tms_agents.floor.state import PRINT, THING, empty, pack, unpack
-from tms_agents.floor.strays import release
-from tms_agents.floor.tracks import Tracks
-from tms_agents.floor.view import View
 
 Array = NDArray[np.float64]
 

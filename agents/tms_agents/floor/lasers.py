@@ -8,8 +8,8 @@ import numpy as np
 
 from tms_agents.devices.scans import Array, Scan, Sweep
 from tms_agents.devices.transport import DeviceState
-from tms_agents.floor.clock import ScanTimes
 from tms_agents.floor.config import LaserSection
+from tms_agents.floor.recordings.clock import ScanTimes
 from tms_agents.floor.settings import Pose
 
 #: Blind or stuck for so long is a fault; a hand that passes the window is none.

@@ -21,7 +21,7 @@ from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.config import FloorConfig, LaserSection
 from tms_agents.floor.core import Floor
 from tms_agents.floor.live_view import LiveView
-from tms_agents.floor.recorder import Recorder
+from tms_agents.floor.recordings.recorder import Recorder
 from tms_agents.floor.settings import Pose
 from tms_agents.floor.warm import compiled_before, warm_up
 from tms_agents.live import serve_view, socket_path

@@ -14,7 +14,7 @@ from tms_agents.devices.arcos import ArcosSession, BaseStatus, Odometry
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.tags import RoundEnd
 from tms_agents.devices.transport import DeviceState, Link
-from tms_agents.floor.clock import ScanTimes
+from tms_agents.floor.recordings.clock import ScanTimes
 from tms_agents.readers import open_reader
 from tms_agents.robot.config import LiveSource
 from tms_agents.robot.records import Moved, Record, Round, Scanned

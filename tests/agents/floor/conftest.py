@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from server_process import ServerProcess
 
-sys.path.append(str(Path(__file__).parent))  # for floor_rig and floor_prints
+sys.path.append(str(Path(__file__).parent))  # for floor_rig, floor_prints and floor_robots
 
 from floor_rig import Rig, config_toml
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tms_agents.floor.clustered import ClusteredScan
+from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.state import PRINT, empty
 
 NOW = 100.0

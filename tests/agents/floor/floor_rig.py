@@ -16,7 +16,7 @@ import numpy as np
 
 from tms_agents.config import read_config
 from tms_agents.devices.scans import Scan, Sweep
-from tms_agents.floor.calibration_file import read_poses
+from tms_agents.floor.calibration.poses import read_poses
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.runner import run
 from tms_agents.running import Posted

@@ -12,7 +12,7 @@ from floor_rig import COMES, DOORS, PUT_AT, QUICK, Playing, Room, agent, laser_t
 
 from tms_agents.devices.emulation import TcpLine
 from tms_agents.devices.scip import ScipDevice
-from tms_agents.floor.formats import read_scans
+from tms_agents.floor.recordings.formats import read_scans
 
 # The estimator compiles where it never ran before.
 pytestmark = pytest.mark.timeout(600)

@@ -13,20 +13,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorSettings, Scene, Sensor, Vanished
-from tms_agents.floor.association import Association
-from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
-from tms_agents.floor.bodies import narrow
+from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import Back, Moved, Stale
-from tms_agents.floor.likelihood import feet
-from tms_agents.floor.masks import Area, Masks, joined
-from tms_agents.floor.missing import missed
-from tms_agents.floor.nobodys import costs
-from tms_agents.floor.one_foot import UNLIKELY
-from tms_agents.floor.review import CONFIRM, NOTHING, THING, Waits, review
-from tms_agents.floor.segmentation import CLUSTER, FADES, Segmenter
-from tms_agents.floor.silence import vacant
+from tms_agents.floor.feet.bodies import narrow
+from tms_agents.floor.feet.likelihood import feet
+from tms_agents.floor.feet.missing import missed
+from tms_agents.floor.feet.nobodys import costs
+from tms_agents.floor.feet.one_foot import UNLIKELY
+from tms_agents.floor.movers.review import CONFIRM, NOTHING, THING, Waits, review
+from tms_agents.floor.movers.tracks import Tracks
+from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND, NO_ECHO
+from tms_agents.floor.scan.masks import Area, Masks, joined
+from tms_agents.floor.scan.segmentation import CLUSTER, FADES, Segmenter
+from tms_agents.floor.scan.silence import vacant
 from tms_agents.floor.state import BODY, PRINT, empty
-from tms_agents.floor.tracks import Tracks
 
 NOW = 100.0
 WAITS = Waits(confirm_s=0.35, confirm_m=0.25, leave_s=1.5, hidden_s=60.0, stale_s=1.0)

@@ -19,10 +19,10 @@ from PIL import Image
 from tms_agents.devices.emulation import TcpLine
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.scip import ScipDevice
-from tms_agents.floor.calibration_file import read_poses
-from tms_agents.floor.canvas import Canvas
-from tms_agents.floor.formats import read_scans
-from tms_agents.floor.recording import ScanWriter
+from tms_agents.floor.calibration.poses import read_poses
+from tms_agents.floor.recordings.formats import read_scans
+from tms_agents.floor.recordings.recording import ScanWriter
+from tms_agents.floor.watch.canvas import Canvas
 from tms_client import cli
 
 POSE = (2.5, 0.05, math.pi / 2)

@@ -10,14 +10,14 @@ from floor_prints import NOW, resting, shows
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, Scene
-from tms_agents.floor.likelihood import too_wide
-from tms_agents.floor.nobodys import costs, known, nobodys
-from tms_agents.floor.one_foot import UNLIKELY
-from tms_agents.floor.patience import brings
-from tms_agents.floor.prints import attend
-from tms_agents.floor.putting import count_feet, set_aside
-from tms_agents.floor.segmentation import CLUSTER
-from tms_agents.floor.shine import expected
+from tms_agents.floor.feet.likelihood import too_wide
+from tms_agents.floor.feet.nobodys import costs, known, nobodys
+from tms_agents.floor.feet.one_foot import UNLIKELY
+from tms_agents.floor.feet.prints import attend
+from tms_agents.floor.feet.putting import count_feet, set_aside
+from tms_agents.floor.feet.shine import expected
+from tms_agents.floor.objects.patience import brings
+from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
 
 

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor import FloorSettings
-from tms_agents.floor.background import BACKGROUND, FOREGROUND, NO_ECHO
-from tms_agents.floor.dark import dark_width
-from tms_agents.floor.freespace import FREE, HIDDEN, HIT, LOOK, PAST, SILENT, look
-from tms_agents.floor.furniture import Furniture, Piece
-from tms_agents.floor.objects import Objects
-from tms_agents.floor.prints import follow
-from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.feet.prints import follow
+from tms_agents.floor.objects.objects import Objects
+from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND, NO_ECHO
+from tms_agents.floor.scan.dark import dark_width
+from tms_agents.floor.scan.freespace import FREE, HIDDEN, HIT, LOOK, PAST, SILENT, look
+from tms_agents.floor.scan.furniture import Furniture, Piece
+from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, THING, empty
 
 PERIOD_S = 0.1

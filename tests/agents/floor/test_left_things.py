@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tms_agents.floor.background import BACKGROUND, BEYOND, FOREGROUND
-from tms_agents.floor.freespace import guard
-from tms_agents.floor.furniture import Furniture
-from tms_agents.floor.prints import follow
-from tms_agents.floor.review import CONFIRM, NOTHING, Waits, review
-from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.feet.prints import follow
+from tms_agents.floor.movers.review import CONFIRM, NOTHING, Waits, review
+from tms_agents.floor.scan.background import BACKGROUND, BEYOND, FOREGROUND
+from tms_agents.floor.scan.freespace import guard
+from tms_agents.floor.scan.furniture import Furniture
+from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0

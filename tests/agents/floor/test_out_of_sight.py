@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from floor_robots import OPEN
 from floor_rooms import Room, sweep, together, walker
-from test_footprints import OPEN
 
 from tms_agents.floor import Appeared, FloorEstimator, Scene, Sensor, Vanished
-from tms_agents.floor.doors import Doors
-from tms_agents.floor.masks import Area
-from tms_agents.floor.outlook import Outlook
+from tms_agents.floor.movers.doors import Doors
+from tms_agents.floor.movers.outlook import Outlook
+from tms_agents.floor.scan.masks import Area
 from tms_agents.floor.state import BODY, empty
 
 GATE = [(4.5, 1.2), (5.5, 1.2), (5.5, 2.8), (4.5, 2.8)]

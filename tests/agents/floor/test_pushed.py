@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tms_agents.floor.association import Association
-from tms_agents.floor.background import BACKGROUND
-from tms_agents.floor.build import only_legs
+from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import Appeared, Back, FloorEvent, Moved, Stale, Vanished
-from tms_agents.floor.furniture import Furniture, Piece
+from tms_agents.floor.feet.build import only_legs
+from tms_agents.floor.movers.tracks import Tracks
+from tms_agents.floor.scan.background import BACKGROUND
+from tms_agents.floor.scan.furniture import Furniture, Piece
 from tms_agents.floor.settings import FloorSettings, Scene
-from tms_agents.floor.tracks import Tracks
 
 NOW = 100.0
 ROOM = [(0.0, -4.0), (9.0, -4.0), (9.0, 4.0), (0.0, 4.0)]

@@ -7,16 +7,16 @@ import pytest
 from floor_rooms import Circle, Room
 
 from tms_agents.floor import Appeared
-from tms_agents.floor.background import BACKGROUND, FOREGROUND
-from tms_agents.floor.bodies import stuck
-from tms_agents.floor.build import SHOD, legs
-from tms_agents.floor.objects import Objects
-from tms_agents.floor.prints import ALONE, UNLIKE, attend, follow, lay_before
-from tms_agents.floor.review import LOST, Waits, review
-from tms_agents.floor.ripening import OBJECT
-from tms_agents.floor.segmentation import CLUSTER
+from tms_agents.floor.feet.bodies import stuck
+from tms_agents.floor.feet.build import SHOD, legs
+from tms_agents.floor.feet.prints import ALONE, UNLIKE, attend, follow, lay_before
+from tms_agents.floor.feet.shine import expected
+from tms_agents.floor.movers.review import LOST, Waits, review
+from tms_agents.floor.objects.objects import Objects
+from tms_agents.floor.objects.ripening import OBJECT
+from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND
+from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.settings import FloorSettings
-from tms_agents.floor.shine import expected
 from tms_agents.floor.state import BODY, PRINT, THING, empty
 
 NOW = 100.0

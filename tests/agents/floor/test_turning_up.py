@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.floor.association import Association
-from tms_agents.floor.background import BACKGROUND
+from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import Back, Stale
+from tms_agents.floor.movers.tracks import Tracks
+from tms_agents.floor.scan.background import BACKGROUND
 from tms_agents.floor.settings import FloorSettings, Scene
 from tms_agents.floor.state import BODY, PRINT, empty
-from tms_agents.floor.tracks import Tracks
 
 NOW = 100.0
 ROOM = [(0.0, -4.0), (9.0, -4.0), (9.0, 4.0), (0.0, 4.0)]

@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable, Sequence
 
 import pytest
+from floor_robots import LENGTH, OPEN, WIDTH, Way, robot
 from floor_rooms import Circle, Room, Segment, box, together, walker
-from test_footprints import LENGTH, OPEN, WIDTH, Way, robot
 
 from tms_agents.floor import Appeared, FloorEstimator, Vanished
-from tms_agents.floor.robot_sizes import weigh
+from tms_agents.floor.robots.sizes import weigh
 from tms_agents.floor.warm import warm_up
 
 #: Somebody behind it is not seen, nor anybody beside the door, on either side.

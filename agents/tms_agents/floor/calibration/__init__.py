@@ -1,0 +1,1 @@
+"""Where the lasers stand, found from walls and from people who walk."""

@@ -1,0 +1,168 @@
+"""``tms floor calibrate``: scans of the lasers, and the pose that fits them best."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tms_agents.clocks import Clocks
+from tms_agents.devices.scans import Scan
+from tms_agents.devices.transport import DeviceState
+from tms_agents.floor.calibration.walkers import Registration, register, walker_tracks
+from tms_agents.floor.calibration.walls import MATCHED_M, Fit, fit_walls, static_points
+from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.lasers import Laser
+from tms_agents.floor.recordings.formats import read_scans
+from tms_agents.floor.recordings.recorded import Recorded, forward
+from tms_agents.floor.runner import listen
+from tms_agents.floor.settings import FloorSettings, Pose
+from tms_client import Town, TownError
+from tms_client.cli import CommandError
+
+Say = Callable[[str], object]
+_MOST_SCANS = 20_000
+_WAIT_S = 20.0
+#: More than this is no fit that an installer wants.
+_LEAST_MATCHED, _MOST_RMSE_M = 0.3, 0.02
+
+
+async def gather(config: FloorConfig, names: Sequence[str], seconds: float) -> list[Recorded]:
+    """What these lasers see for so many seconds, from when all of them deliver.
+
+    Raises:
+        CommandError: one does not deliver.
+    """
+    sections = {one.name: one for one in config.lasers if one.name in names}
+    clocks = Clocks(time.time, time.monotonic)
+    lasers = {name: Laser(section) for name, section in sections.items()}
+    found: dict[str, list[tuple[float, Scan]]] = {name: [] for name in sections}
+
+    def take(name: str, scans: Sequence[Scan]) -> None:
+        mounted = [lasers[name].mounted(scan) for scan in scans]
+        times = lasers[name].times.of(clocks.now(), mounted)
+        found[name] = (found[name] + list(zip(times, mounted, strict=True)))[-_MOST_SCANS:]
+
+    def changed(name: str, state: DeviceState) -> None:
+        lasers[name].line(state)
+
+    tasks = [asyncio.create_task(listen(one, config.silent_after_s, take, changed)) for one in sections.values()]
+    try:
+        until = clocks.now() + _WAIT_S
+        while not all(found.values()):
+            if clocks.now() > until:
+                name = next(name for name, scans in found.items() if not scans)
+                state = lasers[name].state
+                raise CommandError(f"laser {name} delivers no scans{f': {state.why}' if state else ''}")
+            await asyncio.sleep(0.05)
+        for scans in found.values():
+            scans.clear()
+        await asyncio.sleep(seconds)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+    return [_recorded(name, lasers[name].pose, found[name]) for name in names]
+
+
+def from_files(paths: Sequence[Path], config: FloorConfig, names: Sequence[str]) -> list[Recorded]:
+    """The same out of recordings: by the lasers' names, or in their order where there is a file for each.
+
+    Raises:
+        CommandError: a file cannot be read, or it is not clear which laser made it.
+    """
+    recordings = [one for path in paths for one in read_scans(path)]
+    by_name = {one.name: one for one in recordings}
+    if set(names) <= set(by_name):
+        chosen = [by_name[name] for name in names]
+    elif len(recordings) == len(names):
+        chosen = recordings
+    else:
+        raise CommandError(f"the recordings hold {', '.join(sorted(by_name))}, wanted are {', '.join(names)}")
+    poses = {one.name: one.pose.pose for one in config.lasers}
+    return [replace(one, name=name, pose=poses[name]) for name, one in zip(names, chosen, strict=True)]
+
+
+def outline_of(config: FloorConfig, given: str | None) -> list[tuple[float, float]]:
+    """The room's outline: as given ("0,0 6,0 6,5 0,5"), the scene's region, or what the server knows.
+
+    Raises:
+        CommandError: there is none.
+    """
+    if given is not None:
+        try:
+            corners = [tuple(map(float, corner.split(","))) for corner in given.replace(";", " ").split()]
+            if len(corners) < 3 or any(len(corner) != 2 or not all(map(math.isfinite, corner)) for corner in corners):
+                raise ValueError
+        except ValueError:
+            raise CommandError(f"--outline {given!r}: corners like '0,0 6,0 6,5 0,5', metres") from None
+        return [(corner[0], corner[1]) for corner in corners]
+    if config.scene.region is not None:
+        return list(config.scene.region)
+    try:
+        with Town(config.server.url, config.server.key) as town:
+            outline = town.rooms.get(config.room).outline
+    except TownError as error:
+        raise CommandError(
+            f"no outline: give --outline, [scene] region, or a server that knows it ({error})"
+        ) from error
+    if not outline:
+        raise CommandError(f"room {config.room!r} has no outline at the server: give --outline or [scene] region")
+    return list(outline)
+
+
+def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Say, *, force: bool) -> Fit:
+    """Raises CommandError where nothing fits well enough."""
+    try:
+        fit = fit_walls(static_points(recorded.sweep, recorded.ranges), outline, recorded.pose)
+    except ValueError as error:
+        raise CommandError(f"laser {recorded.name}: {error}") from error
+    _tell(recorded.name, recorded.pose, fit.pose, say)
+    near, rmse = MATCHED_M * 1000, fit.rmse_m * 1000
+    say(f"  {fit.matched:.0%} of {fit.points} beams end within {near:.0f} mm of a wall, RMSE {rmse:.1f} mm")
+    x, y, turn = fit.sd[0] * 1000, fit.sd[1] * 1000, math.degrees(fit.sd[2])
+    say(f"  uncertainty: x {x:.1f} mm, y {y:.1f} mm, {turn:.2f} degrees")
+    if (fit.matched < _LEAST_MATCHED or fit.rmse_m > _MOST_RMSE_M) and not force:
+        raise CommandError(
+            f"laser {recorded.name}: that is no good fit; is the outline right, and the pose by ruler within "
+            "half a metre and 20 degrees? --force keeps it"
+        )
+    return fit
+
+
+def by_walkers(known: Recorded, recorded: Recorded, settings: FloorSettings, say: Say, *, force: bool) -> Registration:
+    """The pose of ``recorded``'s laser from people that ``known`` saw, too. Raises CommandError."""
+    there = walker_tracks(known, known.pose, settings)
+    here = walker_tracks(recorded, (0.0, 0.0, 0.0), settings)
+    say(f"  {known.name} saw {len(there)} tracks, {recorded.name} {len(here)}")
+    try:
+        found = register(there, here)
+    except ValueError as error:
+        raise CommandError(f"lasers {known.name} and {recorded.name}: {error}") from error
+    _tell(recorded.name, recorded.pose, found.pose, say)
+    rmse, offset = found.rmse_m * 1000, found.offset_s
+    say(f"  {found.places} places seen by both, RMSE {rmse:.0f} mm, clocks {offset:+.2f} s apart")
+    if found.rmse_m > 0.12 and not force:
+        raise CommandError(f"laser {recorded.name}: that is no good fit; have one person walk there (--force keeps it)")
+    return found
+
+
+def _tell(name: str, before: Pose, after: Pose, say: Say) -> None:
+    say(f"laser {name}: x {after[0]:.3f} m, y {after[1]:.3f} m, theta {after[2]:.4f} rad")
+    moved = math.dist(before[:2], after[:2])
+    turned = math.degrees(math.atan2(math.sin(after[2] - before[2]), math.cos(after[2] - before[2])))
+    say(f"  from the pose in the configuration: {moved * 1000:.0f} mm, {turned:+.2f} degrees")
+
+
+def _recorded(name: str, pose: Pose, scans: Sequence[tuple[float, Scan]]) -> Recorded:
+    if not scans:
+        raise CommandError(f"laser {name} stopped delivering scans")
+    sweep = scans[-1][1].sweep
+    same = [(t, scan) for t, scan in scans if scan.sweep is sweep]
+    t, ranges = np.array([t for t, _ in same]), np.array([scan.ranges for _, scan in same])
+    return forward(Recorded(name, sweep, pose, t, ranges))

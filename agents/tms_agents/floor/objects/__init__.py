@@ -1,0 +1,1 @@
+"""The life of an object: put down, hidden, and taken away."""

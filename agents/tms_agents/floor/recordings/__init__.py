@@ -1,0 +1,1 @@
+"""Scans in files: ours, and those of others."""

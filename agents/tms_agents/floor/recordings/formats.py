@@ -1,0 +1,45 @@
+"""Recorded scans out of files: ours, npz, CSV, ROS bags. All come out alike, whatever stands for "nothing" in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tms_agents.bags import is_bag
+from tms_agents.floor.recordings.formats_csv import read_csv
+from tms_agents.floor.recordings.formats_npz import read_npz
+from tms_agents.floor.recordings.formats_rosbag import read_rosbag
+from tms_agents.floor.recordings.recorded import Recorded, forward
+from tms_agents.floor.recordings.recording import read_recording
+from tms_client.cli import CommandError
+
+
+def read_scans(path: Path) -> list[Recorded]:
+    """Everything that a file holds, a recording per sensor.
+
+    Raises:
+        CommandError: the file cannot be read, is of no known kind or holds no scan; one line that says why.
+    """
+    try:
+        found = _read(path)
+    except OSError as error:
+        raise CommandError(f"{path}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise CommandError(f"{path}: {error}") from error
+    found = [forward(one) for one in found if len(one)]
+    if not found:
+        raise CommandError(f"{path}: it holds no scan")
+    return found
+
+
+def _read(path: Path) -> list[Recorded]:
+    kind = path.suffix.lower()
+    if kind == ".npz":
+        return [read_npz(path)]
+    if kind == ".csv":
+        return [read_csv(path)]
+    if kind == ".scans":
+        return read_recording(path)
+    if is_bag(path):
+        return read_rosbag(path)
+    path.open("rb").close()  # a file that is not there is said to be so
+    raise ValueError("not a recording: its name ends in .scans, .npz, .csv, .bag, .db3 or .mcap")

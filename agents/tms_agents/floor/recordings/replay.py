@@ -1,0 +1,64 @@
+"""Recordings through the estimator: what was on the floor after every scan, as fast as it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from tms_agents.floor import FloorEstimator, FloorEvent, FloorSettings, Scene, Sensor
+from tms_agents.floor.recordings.recorded import Recorded, in_time
+
+
+class Replay:
+    """Several recordings are several lasers of one run."""
+
+    def __init__(
+        self, recordings: Sequence[Recorded], settings: FloorSettings | None = None, scene: Scene | None = None
+    ) -> None:
+        """Raises ValueError where the recordings cannot be of one run, or no estimator can use them."""
+        self.recordings = list(recordings)
+        self._names = _names(self.recordings)
+        sensors = {name: Sensor(one.sweep, one.pose) for name, one in zip(self._names, self.recordings, strict=True)}
+        self.estimator = FloorEstimator(sensors, settings, scene)
+        self.scans = sum(map(len, self.recordings))
+
+    def play(self) -> Iterator[tuple[str, float, int, list[FloorEvent]]]:
+        """After every scan in the order of time: laser, time of its first beam, scan number, what happened."""
+        for number, n in in_time(self.recordings):
+            one = self.recordings[number]
+            t = float(one.t[n])
+            scan = one.scan(n)
+            yield self._names[number], t, n, self.estimator.scan(self._names[number], t, scan.ranges, scan.intensities)
+
+    def frames(self, progress: Callable[[int], None] = lambda done: None) -> list[dict[str, Any]]:
+        """The result of ``tms floor replay``: an entry per scan."""
+        found = []
+        for done, (_, t, _, _) in enumerate(self.play(), 1):
+            labels = [
+                {"id": one.id, "attr": one.kind, "x": round(one.xy[0], 4), "y": round(one.xy[1], 4)}
+                for one in self.estimator.labels()
+            ]
+            found.append({"t": t, "labels": labels})
+            progress(done)
+        return found
+
+
+def tracks(frames: Sequence[dict[str, Any]]) -> list[tuple[int, str, list[list[float]]]]:
+    """(number, mover or object, places) of every label in them, the oldest first."""
+    found: dict[int, tuple[int, str, list[list[float]]]] = {}
+    for frame in frames:
+        for label in frame["labels"]:
+            track = found.setdefault(label["id"], (label["id"], label["attr"], []))
+            track[2].append([label["x"], label["y"]])
+    return list(found.values())
+
+
+def _names(recordings: Sequence[Recorded]) -> list[str]:
+    """A name of its own for each."""
+    names: list[str] = []
+    for one in recordings:
+        name, n = one.name, 2
+        while name in names:
+            name, n = f"{one.name} {n}", n + 1
+        names.append(name)
+    return names

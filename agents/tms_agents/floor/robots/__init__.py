@@ -1,0 +1,1 @@
+"""Robots: wide and rigid, followed by their outline where their size is known."""

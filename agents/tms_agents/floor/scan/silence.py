@@ -1,0 +1,71 @@
+"""Where no beam brings anything: something black or glossy may be there, something faint, or nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.norm import norm
+from tms_agents.floor.scan.freespace import beam_of
+
+Array = NDArray[np.float64]
+
+#: What stands at a place is met within this (m) before or behind it.
+_DEEP_M = 0.1
+
+
+@njit(cache=True)
+def silent(
+    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy.
+
+    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
+    """
+    away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+    count = 0
+    for i in range(low, high + 1):
+        if not np.isfinite(ranges[i]) and np.isfinite(steady[i]) and steady[i] > away:
+            count += 1
+    return bool(count > 0 and 2 * count >= high - low + 1)
+
+
+@njit(cache=True)
+def blank(
+    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly.
+
+    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
+    """
+    _, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+    for i in range(low, high + 1):
+        if not np.isinf(ranges[i]) or np.isfinite(steady[i]):
+            return False
+    return bool(high >= low)
+
+
+@njit(cache=True)
+def vacant(
+    x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
+) -> bool:
+    """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent."""
+    away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+    passes = 0
+    for i in range(low, high + 1):
+        known = np.isfinite(ranges[i])
+        if (known and abs(ranges[i] - away) > _DEEP_M) or (not known and not np.isfinite(longest[i])):
+            passes += 1
+    return bool(2 * passes >= high - low + 1)
+
+
+@njit(cache=True)
+def _towards(x: float, y: float, half: float, pose: Array, first: float, step: float, n: int) -> tuple[float, int, int]:
+    """How far (x, y) is, m, and the first and last of the n beams that meet it ± half m (0 and -1: none)."""
+    away = norm(x - pose[0], y - pose[1])
+    middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
+    if np.isnan(middle):
+        return away, 0, -1
+    reach = np.arctan(half / max(away, 0.05)) / abs(step)
+    return away, max(0, int(np.ceil(middle - reach - 0.5))), min(n - 1, int(middle + reach + 0.5))

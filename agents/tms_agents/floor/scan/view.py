@@ -1,0 +1,79 @@
+"""One sensor: its beams in the room, its background, and how a scan of it is cleaned up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tms_agents.floor.scan.background import Background
+from tms_agents.floor.scan.rays import rays, views
+from tms_agents.floor.scan.segmentation import Segmenter
+from tms_agents.floor.settings import FloorSettings, Point, Pose, Sensor
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def _clean(ranges: Array, nearest: float, farthest: float, out: Array) -> None:
+    """Error codes and NaN become NaN, what is beyond reach no echo (inf)."""
+    for i in range(ranges.size):
+        r = ranges[i]
+        if np.isnan(r) or r < nearest:
+            out[i] = np.nan
+        elif r >= farthest:
+            out[i] = np.inf
+        else:
+            out[i] = r
+
+
+class View:
+    """What belongs to one sensor."""
+
+    def __init__(
+        self, index: int, sensor: Sensor, settings: FloorSettings, mirrors: Sequence[tuple[Point, Point]]
+    ) -> None:
+        angles = np.asarray(sensor.sweep.angles, dtype=float)
+        if angles.ndim != 1 or angles.size < 8:
+            raise ValueError("a sensor of the floor needs at least eight beams")
+        steps = np.diff(angles)
+        if not (np.all(steps > 0) or np.all(steps < 0)):
+            raise ValueError("the beams of a sensor must be in the order of their angles")
+        self.index, self.sensor, self.mirrors = index, sensor, mirrors
+        self.n = angles.size
+        self.first, self.step = float(angles[0]), float(steps.mean())
+        self.background = Background(self.n, self.step, settings)
+        self.segment = Segmenter(np.abs(np.append(steps, steps[-1])), settings.grazing_rad)
+        self.ranges = np.zeros(self.n)
+        self.claimed = np.zeros(self.n, np.bool_)
+        self.last: float | None = None
+        self.ways = views(sensor.pose, mirrors)
+        self.move(sensor.pose)
+
+    def move(self, pose: Pose) -> None:
+        """The sensor stands at ``pose``."""
+        self.pose = np.array(pose, dtype=float)
+        self.rays = rays(self.sensor, pose, self.mirrors)
+
+    def take(self, ranges: Array) -> None:
+        """Take in a scan (n,) m."""
+        sweep = self.sensor.sweep
+        _clean(
+            np.asarray(ranges, dtype=np.float64), max(sweep.range_min_m, 0.02), sweep.range_max_m - 1e-3, self.ranges
+        )
+
+    @property
+    def sight(self) -> tuple[Any, ...]:
+        """What `freespace.clear` needs."""
+        b = self.background
+        return self.ranges, b.states, b.longest, self.pose, self.first, self.step
+
+    @property
+    def reach(self) -> tuple[Array, float, Array, Array]:
+        """What `sight.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
+        sweep = self.sensor.sweep
+        farthest = np.minimum(self.background.longest, self.rays[:, 8])
+        return farthest, sweep.range_max_m - 1e-3, np.asarray(sweep.angles, dtype=float), self.pose

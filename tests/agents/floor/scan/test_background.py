@@ -1,0 +1,109 @@
+"""The background of one sensor: learned while people pass, raised, remembered, drifting."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tms_agents.floor.scan.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO, UNKNOWN, Background
+from tms_agents.floor.settings import FloorSettings
+
+NOBODY = np.zeros(30, np.bool_)
+
+
+def learn(background: Background, ranges: np.ndarray, seconds: float, noise: float = 0.004, seed: int = 0) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(round(seconds * 10)):
+        scan = ranges + rng.normal(0.0, noise, ranges.size)
+        background.classify(scan)
+        background.learn(scan, NOBODY, 0.1)
+
+
+@pytest.fixture
+def learned() -> Background:
+    background = Background(30, math.radians(0.5), FloorSettings())
+    learn(background, np.full(30, 3.0), 8.0)
+    return background
+
+
+def test_what_is_nearer_is_foreground_and_what_is_farther_is_not(learned: Background) -> None:
+    scan = np.full(30, 3.0)
+    scan[5], scan[10], scan[15], scan[20] = 2.95, 3.5, np.inf, np.nan
+    states = learned.classify(scan)
+    assert [states[i] for i in (0, 5, 10, 15, 20)] == [BACKGROUND, FOREGROUND, BEYOND, NO_ECHO, UNKNOWN]
+
+
+def test_who_passes_while_it_is_learned_is_not_background() -> None:
+    background = Background(30, math.radians(0.5), FloorSettings())
+    rng = np.random.default_rng(1)
+    for k in range(80):
+        scan = np.full(30, 3.0) + rng.normal(0.0, 0.004, 30)
+        scan[(k // 4) % 30] = 1.5
+        background.classify(scan)
+        background.learn(scan, NOBODY, 0.1)
+    scan = np.full(30, 3.0)
+    scan[3] = 1.5
+    assert background.classify(scan)[3] == FOREGROUND
+
+
+def test_where_nothing_echoes_anything_is_foreground() -> None:
+    background = Background(30, math.radians(0.5), FloorSettings())
+    learn(background, np.full(30, np.inf), 8.0)
+    assert background.classify(np.full(30, 2.0))[7] == FOREGROUND
+
+
+def test_what_has_gone_is_raised_soon_and_what_returns_is_known(learned: Background) -> None:
+    learn(learned, np.full(30, 4.0), 3.0)
+    assert learned.classify(np.full(30, 4.0))[0] == BACKGROUND
+    assert learned.classify(np.full(30, 3.5))[0] == FOREGROUND
+    assert learned.classify(np.full(30, 3.0))[0] == BACKGROUND
+
+
+def test_it_follows_a_slow_drift(learned: Background) -> None:
+    for k in range(60):
+        learn(learned, np.full(30, 3.0 - 0.001 * k), 2.0, seed=k)
+    assert (learned.classify(np.full(30, 2.94)) == BACKGROUND).all()
+    assert learned.classify(np.full(30, 3.3))[0] == BEYOND
+
+
+def test_what_is_kept_is_not_learned(learned: Background) -> None:
+    scan = np.full(30, 2.0)
+    for _ in range(6000):
+        learned.classify(scan)
+        learned.learn(scan, ~NOBODY, 0.1)
+    assert (learned.classify(scan) == FOREGROUND).all()
+
+
+def test_furniture_is_adopted_at_once(learned: Background) -> None:
+    beams = np.arange(10, 20)
+    learned.adopt(beams, np.full(10, 2.2))
+    scan = np.full(30, 3.0)
+    scan[10:20] = 2.2
+    assert (learned.classify(scan) == BACKGROUND).all()
+
+
+def test_what_has_gone_comes_back_whole_and_anything_less_is_something_new() -> None:
+    """A cupboard, ten beams wide, was moved away a while ago; a small thing lies where its front was."""
+    cupboard = np.full(30, 4.0)
+    cupboard[10:20] = 3.0
+    background = Background(30, math.radians(0.5), FloorSettings())
+    learn(background, cupboard, 8.0)
+    learn(background, np.full(30, 4.0), 8.0)
+    assert (background.classify(cupboard) == BACKGROUND).all()
+    for beams in (slice(13, 16), slice(10, 13), slice(8, 22)):
+        scan = np.full(30, 4.0)
+        scan[beams] = 3.0
+        assert (background.classify(scan)[beams] == FOREGROUND).all()
+    hidden = cupboard.copy()
+    hidden[14:25] = 1.0
+    assert (background.classify(hidden)[10:14] == BACKGROUND).all()
+
+
+def test_something_new_is_not_learned_within_seconds_though_the_room_is_hardly_known(learned: Background) -> None:
+    learn(learned, np.full(30, 3.0), 12.0)
+    scan = np.full(30, 3.0)
+    scan[12:16] = 2.9
+    learn(learned, scan, 5.0)
+    assert learned.classify(scan)[13] == FOREGROUND
