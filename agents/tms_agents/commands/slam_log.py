@@ -11,7 +11,8 @@ import numba
 import numpy as np
 
 from tms_agents.bags import is_bag, read_messages
-from tms_agents.slam.logs import Log, parse_laser, read_log
+from tms_agents.slam.log_files import read_log
+from tms_agents.slam.logs import Log, parse_laser
 from tms_agents.slam.logs_ros import TYPES, parse_messages
 from tms_client.cli import CommandError
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from tms_agents.commands.slam_log import make_folder
 from tms_agents.slam.export import write_map, write_trajectory
-from tms_agents.slam.logs import Log, LogError, lines_of_file, read_log
+from tms_agents.slam.log_files import read_log
+from tms_agents.slam.logs import Log, LogError, lines_of_file
 from tms_agents.slam.semidynamic import (
     Models,
     PaperSettings,

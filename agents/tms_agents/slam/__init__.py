@@ -6,7 +6,8 @@ from tms_agents.slam.filter import ParticleFilter
 from tms_agents.slam.known import MapError, known_map
 from tms_agents.slam.localisation import Localiser
 from tms_agents.slam.localisation_settings import LocalisationSettings
-from tms_agents.slam.logs import Log, LogError, read_log
+from tms_agents.slam.log_files import read_log
+from tms_agents.slam.logs import Log, LogError
 from tms_agents.slam.mapping import Progress, Result, build_map
 from tms_agents.slam.settings import Settings
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from server_process import ServerProcess
 
-sys.path.append(str(Path(__file__).parent))  # for cabinet_rig
+sys.path.append(str(Path(__file__).parent))  # for cabinet_rig and cabinet_bench
 
 from cabinet_rig import Rig, calibration_toml, config_toml
 

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from test_estimator import GEOMETRY, ZONES, Bench, of, share
+from cabinet_bench import GEOMETRY, ZONES, Bench, of, share
 
 from tms_agents.cabinet import Appeared, CabinetEstimator, EstimatorSettings, Vanished
 from tms_agents.cabinet.balance import Balance, search

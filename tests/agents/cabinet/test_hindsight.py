@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from cabinet_bench import GEOMETRY, share
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_estimator import GEOMETRY, share
 
 from tms_agents.cabinet import Appeared, Identified, KnownWeight, Vanished
 from tms_agents.cabinet.episodes import Episode, Outcome, outcomes

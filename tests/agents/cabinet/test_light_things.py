@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_estimator import Bench, of, share
+from cabinet_bench import Bench, of, share
 
 from tms_agents.cabinet import KnownWeight, Vanished
 

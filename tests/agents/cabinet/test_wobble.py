@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_estimator import GEOMETRY, share
+from cabinet_bench import GEOMETRY, share
 
 from tms_agents.cabinet.splitting import path_odds, split
 from tms_agents.cabinet.steps import Step
