@@ -217,8 +217,6 @@ class FloorEstimator:
             return []
         if back := self._tracks.turns_up(self._prints, index, t):
             return back
-        if not q["given"] and self._tracks.absent.stands(q, self._tracks.bodies, t):
-            return []
         if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
             q["revealed"] = MOVED
             return []

@@ -65,7 +65,7 @@ def propose(now: Hypotheses, alike: Integers, top: int, scores: Array, scan: Clu
                 cost[i, 2 * column], cost[i, 2 * column + 1] = told[like, row, i, 0], told[like, row, i, 1]
         nobodys(scan, bodies, rows[:k], spans, cost[:, 2 * k :])
         known(scan, bodies, cost[:, 2 * k :])
-        goes_on(scan, bodies, rows[:k], now.nobodys_at[h], cost[:, 2 * k :])
+        goes_on(scan, bodies, now.nobodys_at[h], cost[:, 2 * k :])
         best = solve(cost, 2 * k, UNLIKELY, columns, solved)
         score[many], parent[many] = scores[h] + best, h
         least = min(least, scores[h] + best)

@@ -142,6 +142,15 @@ def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, sho
 
 
 @njit(cache=True)
+def any_shoe(bodies: Any) -> bool:
+    """Whether any of the bodies (n,) shows shoes."""
+    shod = False
+    for b in range(bodies.size):
+        shod = shod or (bodies[b].used and bodies[b].shoe >= SHOES)
+    return shod
+
+
+@njit(cache=True)
 def only_legs(shoes: NDArray[np.float64]) -> bool:
     """Whether no shoe was seen among the feet here; ``shoes`` (2,) is what `count_shoes` learns."""
     return bool(shoes[1] >= _FEW and shoes[0] < _NO_SHOE)

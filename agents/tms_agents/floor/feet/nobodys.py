@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.bodies import STAND_M, WIDE_M, narrow, scant
-from tms_agents.floor.feet.build import LONGEST_SHOE_M, SHOES
+from tms_agents.floor.feet.build import LONGEST_SHOE_M, any_shoe
 from tms_agents.floor.feet.likelihood import LEG_M, feet, too_wide, waits
 from tms_agents.floor.feet.one_foot import FRESH_S, UNLIKELY
 from tms_agents.floor.feet.prints import thin
@@ -56,7 +56,7 @@ def nobodys(scan: ClusteredScan, bodies: Any, rows: NDArray[np.int64], spans: Ar
     """
     clusters, of, prints, t = scan.clusters, scan.of, scan.prints, scan.t
     m, k = clusters.size, rows.size
-    longest = LONGEST_SHOE_M if _shod(bodies, rows) else LEG_M
+    longest = LONGEST_SHOE_M if any_shoe(bodies) else LEG_M
     for i in range(m):
         c = clusters[i]
         cost[i, :] = UNLIKELY
@@ -107,14 +107,14 @@ def known(scan: ClusteredScan, bodies: Any, cost: Array) -> None:
 
 
 @njit(cache=True)
-def goes_on(scan: ClusteredScan, bodies: Any, rows: NDArray[np.int64], nobodys_at: Array, cost: Array) -> None:
+def goes_on(scan: ClusteredScan, bodies: Any, nobodys_at: Array, cost: Array) -> None:
     """Lower the ``cost`` (m, m) of being nobody's of clusters on prints that were so just before, if people wear shoes.
 
-    ``nobodys_at`` (p,) is when each print was nobody's last, in the hypothesis in which ``rows`` (k,) are who is there.
+    ``nobodys_at`` (p,) is when each print was nobody's last, in the hypothesis of these ``bodies`` (n,).
     Else a hypothesis in which somebody unknown stands there costs more with every scan, until it is given up, and
     one of his neighbours has his feet.
     """
-    if not _shod(bodies, rows):
+    if not any_shoe(bodies):
         return
     of, prints, t = scan.of, scan.prints, scan.t
     for i in range(of.size):
@@ -154,12 +154,3 @@ def spanned(clusters: Any, spans: Array) -> None:
                 continue
             if (c.cut != 0 and p.cut != 0) or between <= _FADED:
                 spans[i] = min(spans[i], norm(c.x - p.x, c.y - p.y) + 0.5 * (c.width + p.width))
-
-
-@njit(cache=True)
-def _shod(bodies: Any, rows: NDArray[np.int64]) -> bool:
-    """Whether any of the bodies ``rows`` (k,) shows shoes."""
-    shod = False
-    for row in rows:
-        shod = shod or bodies[row].shoe >= SHOES
-    return shod

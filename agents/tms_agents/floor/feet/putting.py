@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.bodies import narrow
-from tms_agents.floor.feet.build import SHOES
+from tms_agents.floor.feet.build import any_shoe
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.segmentation import CLUSTER
 
@@ -90,15 +90,6 @@ def _walks(c: Any, j: int, prints: Any, t: float) -> bool:
         if new and not slim and _NEXT_M[0] < norm(c.x - q.x, c.y - q.y) < _NEXT_M[1]:
             q.given, walks = 0, True
     return walks
-
-
-@njit(cache=True)
-def _shod(bodies: Any) -> bool:
-    """Whether any of the bodies (n,) shows shoes."""
-    shod = False
-    for b in range(bodies.size):
-        shod = shod or (bodies[b].used and bodies[b].shoe >= SHOES)
-    return shod
 
 
 @njit(cache=True)
@@ -183,7 +174,7 @@ def _set_aside(
                 q.given = 0
             new = t - q.first <= _NEW_S and q.owner < 0 and q.hits < 3 and clusters[k].width < width_m
             if new and not q.given and _put(clusters[k], of[k], prints, bodies, t):
-                q.given = not (_shod(bodies) and _walks(clusters[k], of[k], prints, t))
+                q.given = not (any_shoe(bodies) and _walks(clusters[k], of[k], prints, t))
             thing = q.given == 1
         if not thing:
             k += 1

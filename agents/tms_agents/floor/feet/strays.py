@@ -30,9 +30,9 @@ _APART_M, _STOOD_S = 0.33, 2.0
 _PUT_S, _LATER_S, _BESIDE_M, _LANDS_S = 10.0, 5.0, 0.06, 1.0
 #: What has been nobody's for so long (s), and half of the time, is no foot rather than what came last.
 _IDLE_S, _IDLE = 1.0, 0.5
-#: A shoe from its side is wider (m) than a thing, of which so often (share) all is seen; what is so often behind
-#: something new is his shoe: the thing was put before it.
-_SIDE_M, _SLIM_M, _SEEN, _BEHIND = 0.17, 0.15, 0.2, 0.8
+#: A shoe from its side is wider (m) than a thing; what is so often (share) behind something new is his shoe: the thing
+#: was put before it.
+_SIDE_M, _BEHIND = 0.17, 0.8
 #: Two legs side by side, one thing to the laser, look wider (m) than one, and at most so wide.
 _PAIR_M = (0.16, 0.3)
 
@@ -53,11 +53,6 @@ def _stray(body: Any, prints: Any, t: float, shod: bool, sight: Any) -> int:
             # Both legs stood there before the other came.
             both = not shoes and _PAIR_M[0] < odd.width < _PAIR_M[1] and other.first - odd.first > _STOOD_S
             return 1 if first != both else 2
-    if stood > _ASTRIDE_S and apart > _APART_M and shod:
-        # Nobody stands for so long with one foot pointing at the laser and the other one across.
-        first, second = _slim(p) and q.width > _SIDE_M, _slim(q) and p.width > _SIDE_M
-        if first != second:
-            return 1 if first else 2
     # A foot that is lost sight of seems to land anew where it has stood all the time.
     a_came, b_came = min(body.a_land, p.rested), min(body.b_land, q.rested)
     put = stood > _PUT_S and apart > _APART_M and abs(a_came - b_came) > _LATER_S
@@ -86,12 +81,6 @@ def _rather(p: Any, q: Any, later: bool, t: float, shod: bool) -> bool:
     if shod and behind != before and (p.width if before else q.width) < _SIDE_M:
         return bool(before)
     return later
-
-
-@njit(cache=True)
-def _slim(q: Any) -> bool:
-    """Whether the print, all in view now and then, is narrower than a shoe from its side."""
-    return bool(q.width < _SLIM_M and q.whole > _SEEN * q.hits)
 
 
 @njit(cache=True)

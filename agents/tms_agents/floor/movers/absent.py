@@ -150,13 +150,6 @@ class Absent:
                 best, best_cost = index, cost
         return best
 
-    def stands(self, print_: Any, bodies: Any, t: float) -> bool:
-        """Whether the print (`state.PRINT`) may be a foot of one of them: it came near where he was lost of late.
-
-        Not if it was taken for a foot of one of the ``bodies`` (n,), who has left it.
-        """
-        return any(t - one["seen"] < _LATELY_S for one in self._near(print_, bodies))
-
     def standing(self, print_: Any, bodies: Any) -> Any:
         """Who of them most probably stands on the print, and nobody else does: or None."""
         seen = bodies[(bodies["used"] == 1) & (bodies["confirmed"] == 1) & (bodies["stale"] == 0)]

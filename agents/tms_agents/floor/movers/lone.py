@@ -20,8 +20,6 @@ from tms_agents.floor.scan.freespace import HIDDEN, clear
 #: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody
 #: leaves a foot so far (m) behind, but it may have come and be hidden here: time counts less.
 _STEP_M, _STRIDE_M, _SLOWER = 0.1, 0.9, 2.0
-#: Two people, of each of whom one foot is seen for so long (s), do not stand so near (m) each other.
-_SHARED_S, _BODY_M = 2.0, 0.27
 #: What had stood there for so long (s) before somebody's only foot came there, or is as wide as no foot of his, or who
 #: he was may have begun elsewhere: it is most likely a thing, time counts more.
 _OLDER_S, _FASTER = 1.0, 2.5
@@ -57,8 +55,7 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
     body = bodies[b]
     only_a = body.a_seen >= body.b_seen
     foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
-    shares = _shares(bodies, b, t)
-    if not shares and not _is_lone(body, t):
+    if not _is_lone(body, t):
         both = max(t - body.a_seen, t - body.b_seen) < 1.0
         # What was hidden meanwhile goes on being alone.
         if both or norm(foot_x - body.lone_x, foot_y - body.lone_y) > _STEP_M:
@@ -68,7 +65,7 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
     behind = t - at > 0.5 and clear(x, y, _STEP_M, *sight) == HIDDEN
     if body.lone == 0.0:
         body.lone_x, body.lone_y = foot_x, foot_y
-    if shares or body.older > _OLDER_S or suspected(body):
+    if body.older > _OLDER_S or suspected(body):
         body.lone += dt * _FASTER
     elif not behind or body.odd == ALONE:
         faster = _FASTER if body.odd and not behind else 1.0
@@ -76,31 +73,6 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
         body.lone += dt * (faster if gone else _IN_SIGHT)
     elif norm(foot_x - x, foot_y - y) > _STRIDE_M:
         body.lone += dt / _SLOWER
-
-
-@njit(cache=True)
-def _shares(bodies: Any, b: int, t: float) -> bool:
-    """Whether the only foot seen of the body b is the other foot of somebody who stood there before: they are one."""
-    body = bodies[b]
-    x, y, landed, other_seen = _only_foot(body)
-    if t - other_seen < _SHARED_S:
-        return False
-    for o in range(bodies.size):
-        other = bodies[o]
-        if o == b or not other.used or not other.confirmed or other.robot or other.stale or other.wide > 0.6:
-            continue
-        other_x, other_y, before, unseen = _only_foot(other)
-        if before < landed and t - unseen > _SHARED_S and norm(other_x - x, other_y - y) < _BODY_M:
-            return True
-    return False
-
-
-@njit(cache=True)
-def _only_foot(body: Any) -> tuple[float, float, float, float]:
-    """Where the foot is that was seen last (x, y, m), when it landed, and when the other one was seen."""
-    if body.a_seen >= body.b_seen:
-        return body.ax, body.ay, body.a_land, body.b_seen
-    return body.bx, body.by, body.b_land, body.a_seen
 
 
 @njit(cache=True)

@@ -21,8 +21,6 @@ _SIDE_M, _UNDER_M, _LIKE, _BESIDE_M, _NOW_S = 0.17, 0.3, 1.0, 0.6, 0.2
 #: Of a leg behind somebody else's one sees a part. What is black or glossy is hardly ever seen whole either, and silent
 #: in so many scans.
 _MUTES = 6
-#: Where somebody stood for so long (s) he may still stand so long (s) after he was taken for somebody else beside.
-_HIS_S, _STILL_S = 20.0, 30.0
 #: What is so much of the time a part of something else is watched for so long (s).
 _JOINED, _JOINED_S = 0.3, 25.0
 #: Nobody is near who is not nearer (m).
@@ -48,10 +46,7 @@ def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> f
         return _WATCHED_S if foot or part else 0.0
     if q.attached > _JOINED:
         return _JOINED_S
-    gone = has_left(q, bodies)
-    if q.owned - q.first > _HIS_S and t - q.owned < _STILL_S and not gone:
-        return np.inf
-    return _WATCHED_S if t - q.busy < _NOW_S or (hardly and not gone) else 0.0
+    return _WATCHED_S if t - q.busy < _NOW_S or (hardly and not has_left(q, bodies)) else 0.0
 
 
 @njit(cache=True)

@@ -103,6 +103,6 @@ def test_whoever_came_unknown_is_paid_for_once(shoe: float, since: float, nobody
     bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
     bodies["used"] = bodies["confirmed"] = 1
     bodies["shoe"], prints["used"], prints["first"] = shoe, 1, since
-    cost, one = np.full((1, 1), 11.0), np.zeros(1, np.int64)
-    goes_on(shows(clusters, prints, 5.0, 0), bodies, one, np.array([nobodys_at]), cost)
+    cost = np.full((1, 1), 11.0)
+    goes_on(shows(clusters, prints, 5.0, 0), bodies, np.array([nobodys_at]), cost)
     assert bool(cost[0, 0] < 11.0) == costs_less

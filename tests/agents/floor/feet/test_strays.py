@@ -75,7 +75,6 @@ def test_a_foot_that_was_hidden_for_a_while_has_not_come_since() -> None:
 @pytest.mark.parametrize(
     ("fields", "shoes", "kept"),
     [
-        ({"width": (0.08, 0.25)}, SHOES, (-1, 1)),
         ({"width": (0.08, 0.25)}, LEGS, (0, -1)),  # two legs side by side may look so wide
         ({"width": (0.08, 0.25), "whole": (5, 100)}, SHOES, (0, -1)),  # of the first hardly ever all is seen
         ({"covered": (0, 95)}, SHOES, (-1, 1)),  # the second stands behind something: the first was put before it
@@ -162,27 +161,6 @@ def test_the_foot_of_another_is_not_put_there(idle: float, given: int) -> None:
     bodies["a_print"], bodies["b_print"] = 0, 1
     assert release(bodies, prints, NOW, LEGS, HIDDEN) == 1
     assert prints["given"].tolist() == [0, given]
-
-
-@pytest.mark.parametrize(
-    ("ago", "widths", "whole", "kept"),
-    [
-        ((50.0, 6.0), (0.25, 0.08), 100, (0, -1)),
-        ((50.0, 6.0), (0.08, 0.25), 100, (-1, 1)),
-        ((7.0, 7.0), (0.25, 0.08), 100, (0, -1)),  # they came together
-        ((50.0, 4.0), (0.25, 0.08), 100, (0, 1)),  # he may turn that foot yet
-        ((50.0, 6.0), (0.25, 0.16), 100, (0, 1)),  # he may stand so
-        ((50.0, 6.0), (0.25, 0.08), 10, (0, 1)),  # hardly ever all of it is seen
-    ],
-)
-def test_nobody_stands_with_one_shoe_along_and_the_other_across(
-    ago: tuple[float, float], widths: tuple[float, float], whole: int, kept: tuple[int, int]
-) -> None:
-    """Even if it looks as if he had put his foot there."""
-    bodies, prints = standing(0.36, *ago, width=widths, whole=(100, whole) if widths[0] > widths[1] else (whole, 100))
-    bodies["a_ox"] = bodies["b_ox"] = 0.1
-    assert release(bodies, prints, NOW, SHOES, FREE) == (-1 in kept)
-    assert stands_on(bodies) == kept
 
 
 def test_a_shoe_seen_from_its_side_was_not_put_before_the_other_one() -> None:

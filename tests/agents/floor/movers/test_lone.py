@@ -93,21 +93,3 @@ def test_what_was_nobodys_for_a_moment_had_not_stood_there_before(idle: float, o
     prints["used"], prints["first"], prints["rested"], prints["idle"] = 1, NOW - 60.0, NOW - 60.0, idle
     attend(prints, bodies, NOW, 0.1, expected(), np.zeros(2))
     assert bodies["older"][0] == older
-
-
-@pytest.mark.parametrize(
-    ("fields", "two"),
-    [
-        ({}, False),
-        ({"ax": 0.3}, True),  # as near as two people stand
-        ({"a_land": NOW - 8.0}, True),  # came later: it is he who is not there
-        ({"b_seen": NOW - 1.0}, True),  # both his feet were seen just now
-        ({"stale": 1}, True),
-        ({"robot": 1}, True),
-    ],
-)
-def test_two_who_show_one_foot_each_beside_each_other_are_one(fields: dict[str, float], two: bool) -> None:
-    """Nothing of the other foot is seen where it should be, so it is hidden: else no time would count."""
-    other = {"used": 1, "confirmed": 1, "hits": 900, "ax": 0.2, "a_seen": NOW, "a_land": NOW - 50.0}
-    other |= {"b_seen": NOW - 20.0, "first": NOW - 60.0, "x0": 9.0}
-    assert counted(other | fields) == pytest.approx(0.1 if two else 2.5)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from tms_agents.floor import FloorSettings
@@ -71,13 +69,6 @@ def test_whose_foot_it_was_has_gone_also_if_he_is_hidden_there() -> None:
     assert wanted(2.0, unseen_s=0.7, **gone) == wanted(2.0, unseen_s=3.0, **gone) == 0.0
     assert wanted(0.5, unseen_s=3.0, **gone) > 10.0
     assert wanted(2.0, unseen_s=3.0, hidden_foot_s=0.6, **gone) > 10.0  # this may be the other one
-
-
-def test_where_somebody_stood_for_long_he_is_waited_for_until_he_is_seen_elsewhere() -> None:
-    stood = {"first": NOW - 60.0, "rested": NOW - 60.0, "whose": 1, "owned": NOW - 9.0, "busy": NOW - 9.0}
-    assert wanted(0.5, **stood) == math.inf
-    assert wanted(2.0, **stood) == 0.0
-    assert wanted(0.5, **(stood | {"owned": NOW - 31.0})) == 0.0
 
 
 @pytest.mark.parametrize(
