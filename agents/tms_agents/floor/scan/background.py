@@ -306,7 +306,7 @@ class Background:
             self.steady,
             self._back,
         )
-        whole(ranges, self.centre, self.weight, self.missing, self._least, FOREGROUND, self.states, self._back)
+        whole(ranges, self.centre, self.weight, self.missing, FOREGROUND, self.states, self._back)
         return self.states
 
     def learn(self, ranges: Array, keep: NDArray[np.bool_], dt: float) -> None:

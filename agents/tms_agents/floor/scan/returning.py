@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: A surface whose place has been looked past for so long (s) has gone.
-GONE_S = 5.0
+GONE_S = 2.5
 #: The ranges of one surface differ so little from beam to beam (m).
 _SURFACE_M = 0.05
 
@@ -20,7 +20,6 @@ def whole(
     centre: Array,
     weight: Array,
     missing: Array,
-    least: Array,
     foreground: int,
     states: NDArray[np.int8],
     back: NDArray[np.bool_],
@@ -42,9 +41,11 @@ def whole(
         for edge, side in ((a, -1), (b, 1)):
             r = ranges[edge]
             past, beside = True, edge + side
+            surface = _gone_near(centre, weight, missing, edge, r)
             for i in (beside, beside + side):
-                # The rest of its surface is still looked past.
-                past = past and _shown(centre, weight, missing, least, i, r) and ranges[i] > r + _SURFACE_M
+                # The rest of its surface, aslant or not, is still looked past.
+                surface = _gone_near(centre, weight, missing, i, surface)
+                past = past and ranges[i] > surface + _SURFACE_M
             wider = 0 <= beside < n and states[beside] == foreground and abs(ranges[beside] - r) < _SURFACE_M
             new = new or past or wider
         if new:
@@ -53,10 +54,15 @@ def whole(
 
 
 @njit(cache=True)
-def _shown(centre: Array, weight: Array, missing: Array, least: Array, i: int, r: float) -> bool:
-    """Whether something that has gone was at the range r of beam i."""
+def _gone_near(centre: Array, weight: Array, missing: Array, i: int, r: float) -> float:
+    """Where (m) something was that has gone, seen by beam i near the range r: infinity where nothing was.
+
+    However seldom it was seen: what is behind it is soon believed instead.
+    """
+    found, nearest = np.inf, _SURFACE_M
     if 0 <= i < centre.shape[0]:
         for j in range(centre.shape[1]):
-            if weight[i, j] > least[i] and missing[i, j] > GONE_S and abs(centre[i, j] - r) < _SURFACE_M:
-                return True
-    return False
+            gap = abs(centre[i, j] - r)
+            if weight[i, j] > 0.0 and missing[i, j] > GONE_S and gap < nearest:
+                found, nearest = centre[i, j], gap
+    return found

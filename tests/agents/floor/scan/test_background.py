@@ -101,6 +101,20 @@ def test_what_has_gone_comes_back_whole_and_anything_less_is_something_new() -> 
     assert (background.classify(hidden)[10:14] == BACKGROUND).all()
 
 
+def test_what_is_put_where_a_slanting_front_was_seconds_ago_is_new_and_stays_so() -> None:
+    """A trolley has just been pushed away: what lies there then is as far off as a part of it was."""
+    wall, trolley = np.full(40, 5.6), np.full(40, 5.6)
+    trolley[10:30] = 5.0 + 0.02 * np.arange(20)
+    background = Background(40, math.radians(0.25), FloorSettings())
+    learn(background, trolley, 30.0)
+    learn(background, wall, 3.5)
+    thing = wall.copy()
+    thing[17:23] = 5.19
+    for _ in range(50):
+        assert (background.classify(thing)[18:22] == FOREGROUND).all()
+        background.learn(thing, np.zeros(40, np.bool_), 0.1)
+
+
 def test_something_new_is_not_learned_within_seconds_though_the_room_is_hardly_known(learned: Background) -> None:
     learn(learned, np.full(30, 3.0), 12.0)
     scan = np.full(30, 3.0)
