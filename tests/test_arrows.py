@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,27 @@ def test_imports_follow_the_arrows(name: str, path: Path) -> None:
         assert any(inside == name or inside.startswith(name + "/") for name in allowed), (
             f"{name}:{line} imports {module}; {room} may import {sorted(allowed)}"
         )
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Not for types alone, either: what a part is given is a protocol beside it."""
+    paths = {name.removesuffix(".py").removesuffix("/__init__").replace("/", "."): path for name, path in sources()}
+    graph = {module: set(imported(path, set(paths))) for module, path in paths.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail("a circle: " + " <- ".join(error.args[1]))
+
+
+def imported(path: Path, known: set[str]) -> Iterator[str]:
+    """Which of the ``known`` modules a file imports. Who takes a module from its package does not mean the package."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                module = f"{node.module}.{alias.name}"
+                yield from (one for one in [module if module in known else node.module] if one in known)
 
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from tms_schemas.events import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft, TagObserved
 from tms_schemas.observation import Inventory, InventoryLabel
+from tms_server.town.folding import Folding
 from tms_server.town.sight import P_UNSEEN
 
-if TYPE_CHECKING:
-    from tms_server.town.fold import RoomFold
 
-
-def reconcile(fold: RoomFold, inventory: Inventory) -> None:
+def reconcile(fold: Folding, inventory: Inventory) -> None:
     """Vanished labels, movers, new labels, then reads: the order of one instant."""
     items, agent = {item.label: item for item in inventory.labels}, fold.record.agent
     known = {name: info for name, info in fold.state.labels.items() if info.agent == agent and not info.ghost}

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from tms_server.log.bodies import ObjectRemoved, RegistryBody, RoomChanged, TrackedObject
 from tms_server.placement import ObjectSpec, ParameterError, Parameters
-
-if TYPE_CHECKING:
-    from tms_server.town.fold import RoomFold
+from tms_server.town.folding import Folding
 
 
-def apply(fold: RoomFold, body: RegistryBody) -> None:
+def apply(fold: Folding, body: RegistryBody) -> None:
     match body:
         case ObjectRemoved(tag=tag):
             if fold.state.names.pop(tag, None) is not None:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from tms_schemas.events import LabelMoved, MoverEntered, TagMissed, TagObserved
 from tms_schemas.observation import AgentState, PoseReport, RawRead
 from tms_schemas.rooms import Zone
+from tms_server.town.folding import Folding
 from tms_server.town.geometry import inside
 
-if TYPE_CHECKING:
-    from tms_server.town.fold import RoomFold
 
-
-def apply(fold: RoomFold, report: RawRead | PoseReport | AgentState) -> None:
+def apply(fold: Folding, report: RawRead | PoseReport | AgentState) -> None:
     match report:
         case RawRead() as read:
             _zone_read(fold, read)
@@ -24,7 +20,7 @@ def apply(fold: RoomFold, report: RawRead | PoseReport | AgentState) -> None:
             fold.state.agents[agent] = fold.state.agents[agent]._replace(state=state)
 
 
-def _zone_read(fold: RoomFold, read: RawRead) -> None:
+def _zone_read(fold: Folding, read: RawRead) -> None:
     """Expand the antenna's zone to the labels in it now: the tag is at one of them, or none of its tags was seen."""
     zone = _zone(fold, read.zone)
     if zone is None:
@@ -44,14 +40,14 @@ def _zone_read(fold: RoomFold, read: RawRead) -> None:
                 fold.fold(TagMissed(labels=within, tag=tag))
 
 
-def _zone(fold: RoomFold, zone_id: str) -> Zone | None:
+def _zone(fold: Folding, zone_id: str) -> Zone | None:
     room, agent = fold.state.room, fold.record.agent
     sensors = room.sensors if room is not None else []
     zones = (zone for sensor in sensors if sensor.agent == agent for zone in sensor.zones)
     return next((zone for zone in zones if zone.id == zone_id), None)
 
 
-def _pose(fold: RoomFold, report: PoseReport) -> None:
+def _pose(fold: Folding, report: PoseReport) -> None:
     """The agent's own mover is there, whether or not it was announced."""
     x, y, theta = report.pose
     if report.label in fold.state.labels:

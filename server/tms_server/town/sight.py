@@ -7,18 +7,15 @@ read on. So a catalogue of thousands costs nothing, and the first read of a thin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from tms_schemas import events
-
-if TYPE_CHECKING:
-    from tms_server.town.fold import RoomFold
+from tms_server.town.folding import Folding
 
 #: Probability that a thing came from outside where nobody was there to bring it, or to see who did.
 P_UNSEEN = 0.5
 
 
-def is_first(event: events.Event, fold: RoomFold) -> bool:
+def is_first(event: events.Event, fold: Folding) -> bool:
     """Whether ``event`` is a label whose content probably came from outside.
 
     Either a reader names a thing that was never seen here, or no mover is known: rooms with cabinets and no floor
@@ -37,7 +34,7 @@ def is_first(event: events.Event, fold: RoomFold) -> bool:
     return False
 
 
-def as_content(event: events.Event, fold: RoomFold) -> events.Event:
+def as_content(event: events.Event, fold: Folding) -> events.Event:
     """The event for the engine, to which a tag that is not registered says nothing.
 
     A new label whose reader names such a tag holds something unregistered, most likely: no tracked object was read.
@@ -47,7 +44,7 @@ def as_content(event: events.Event, fold: RoomFold) -> events.Event:
     return event
 
 
-def _introduce(tag: str, labels: Sequence[str], fold: RoomFold) -> bool:
+def _introduce(tag: str, labels: Sequence[str], fold: Folding) -> bool:
     """Give an object to the engine: outside, or as probably at one of ``labels``. False where the engine has it."""
     spec = fold.state.unseen.pop(tag, None)
     if spec is None:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from tms_agents.simulation.floor_world.gait import Walker
+from tms_agents.simulation.floor_world.plan import Plan, Ways
 from tms_agents.simulation.floor_world.shapes import Xy
 from tms_agents.simulation.floor_world.tasks import Do, Drag, Face, Go, Sit, Story, Task, Wait
 
-if TYPE_CHECKING:
-    from tms_agents.simulation.floor_world.life import Life
-
-#: People never come nearer to each other's middle than ``Life.closest_m``, and keep off by a little more.
+#: People never come nearer to each other's middle than ``closest_m``, and keep off by a little more.
 _PERSONAL = 1.2
 #: What feet can do to speed up, slow down and turn, m/s2.
 _PUSH = 2.0
@@ -23,6 +21,29 @@ _SWAY_M = 0.02
 #: Who gets no further for so long thinks of something else; a robot so near (m) is given way by so much (m) before.
 _STUCK_S = 4.0
 _NARROW_M, _ASIDE_M = 1.0, 0.8
+
+
+class LifeAround(Protocol):
+    """What a mover sees of the life around it, and what it may do there."""
+
+    plan: Plan
+    #: Between the middles of two people.
+    closest_m: float
+
+    def others(self, mover: Mover) -> list[Mover]:
+        """Everybody but this one."""
+
+    def ways(self, mover: Mover) -> Ways:
+        """For a body like this one."""
+
+    def tight_ways(self) -> Ways:
+        """Where a person can squeeze through."""
+
+    def drag(self, task: Drag, t: float) -> None:
+        """Begin to move a piece of furniture."""
+
+    def dragged(self, task: Drag, t: float, dt: float) -> Xy:
+        """How far it went in the last ``dt`` seconds."""
 
 
 @dataclass(slots=True)
@@ -53,7 +74,7 @@ class Mover:
     def radius(self) -> float:
         return 0.2 if self.size is None else math.hypot(*self.size) / 2
 
-    def step(self, life: Life, t: float, dt: float) -> None:
+    def step(self, life: LifeAround, t: float, dt: float) -> None:
         """Do the task on hand for ``dt`` seconds; a new one when it is done. Sets ``gone`` when the story is over."""
         if self.task is None:
             self.task = next(self.story, None)
@@ -64,7 +85,7 @@ class Mover:
         if self._carry_on(life, t, dt):
             self.task = None
 
-    def _begin(self, life: Life, t: float) -> None:
+    def _begin(self, life: LifeAround, t: float) -> None:
         task = self.task
         self._began, self._from, self._rest, self._sway = t, self.xy, self.xy, (0.0, 0.0)
         if isinstance(task, Go):
@@ -82,7 +103,7 @@ class Mover:
         elif isinstance(task, Sit):
             self._until = t + 1.0 + task.seconds + 1.0
 
-    def _carry_on(self, life: Life, t: float, dt: float) -> bool:
+    def _carry_on(self, life: LifeAround, t: float, dt: float) -> bool:
         """Whether the task is done."""
         task = self.task
         if isinstance(task, Do):
@@ -104,7 +125,7 @@ class Mover:
             self._stand(dt)
         return t >= self._until
 
-    def _step_aside(self, life: Life, t: float) -> bool:
+    def _step_aside(self, life: LifeAround, t: float) -> bool:
         """Whether somebody in a robot's way, and it in his, now goes back a little; a robot itself never does."""
         robots = [other for other in life.others(self) if other.size is not None]
         robot = min(robots, key=lambda other: math.dist(self.xy, other.xy), default=None)
@@ -120,7 +141,7 @@ class Mover:
         self._aside, self._began, self._until = True, t, t + _STUCK_S
         return True
 
-    def _walk(self, life: Life, dt: float) -> None:
+    def _walk(self, life: LifeAround, dt: float) -> None:
         while self._path and math.dist(self.xy, self._path[0]) < (0.06 if len(self._path) == 1 else 0.25):
             self._path.pop(0)
         if not self._path:
@@ -138,7 +159,7 @@ class Mover:
         else:
             self._drive(wish, life, dt)
 
-    def _give_way(self, life: Life, wish: Xy) -> Xy:
+    def _give_way(self, life: LifeAround, wish: Xy) -> Xy:
         """Away from who is near, and past him on the right."""
         x, y = wish
         for other in life.others(self):
@@ -155,7 +176,7 @@ class Mover:
                 y += min(push, 0.8) * dx / apart
         return (x, y)
 
-    def _push_on(self, wish: Xy, life: Life, dt: float) -> None:
+    def _push_on(self, wish: Xy, life: LifeAround, dt: float) -> None:
         change = (wish[0] - self.velocity[0], wish[1] - self.velocity[1])
         most = _PUSH * dt / max(math.hypot(*change), _PUSH * dt)
         vx, vy = self.velocity[0] + most * change[0], self.velocity[1] + most * change[1]
@@ -169,7 +190,7 @@ class Mover:
                 self._shift(there, dt)
                 return
 
-    def _has_room(self, there: Xy, life: Life) -> bool:
+    def _has_room(self, there: Xy, life: LifeAround) -> bool:
         """Not nearer to anybody than one can be, or at least not nearer than now."""
         for other in life.others(self):
             robots = (self.size is not None) + (other.size is not None)
@@ -179,7 +200,7 @@ class Mover:
                 return False
         return True
 
-    def _drive(self, wish: Xy, life: Life, dt: float) -> None:
+    def _drive(self, wish: Xy, life: LifeAround, dt: float) -> None:
         """A robot turns first, then goes; it waits for who is in its way."""
         heading = math.atan2(wish[1], wish[0])
         off = math.remainder(heading - self.yaw, 2 * math.pi)
