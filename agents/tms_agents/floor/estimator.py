@@ -252,30 +252,15 @@ class FloorEstimator:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything known, as JSON values: backgrounds, movers, objects, and the last label given."""
-        sensors = {}
-        for name, view in self._views.items():
-            arrays, numbers = view.background.save()
-            sensors[name] = {
-                "background": {key: pack(array) for key, array in arrays.items()},
-                **numbers,
-                "pose": view.pose.tolist(),
-                "last": view.last,
-            }
         return {
             "format": _FORMAT,
-            "sensors": sensors,
+            "sensors": {name: view.save() for name, view in self._views.items()},
             "association": self._association.save(),
             "shoes": pack(self._shoes),
-            "absent": self._tracks.absent.save(),
-            "strides": self._tracks.strides,
-            "flickering": self._tracks.flickering.save(),
             "prints": pack(self._prints),
-            "things": pack(self._objects.things),
-            "visitors": self._objects.visitors.save(self._objects.things),
-            "waiting": [[k, rested, who] for k, (rested, who) in self._objects.waiting.items()],
-            "robot_at": self._objects.robot_at if np.isfinite(self._objects.robot_at) else None,
-            "furniture": self._furniture.save(),
-            "legs": self._furniture.legs,
+            **self._tracks.save(),
+            **self._objects.save(),
+            **self._furniture.save(),
             "footprints": self._footprints.save(),
             "extrinsics": self._extrinsics.save(),
             "labels": self._labels,
@@ -302,28 +287,12 @@ class FloorEstimator:
             if set(state["sensors"]) != set(self._views):
                 raise ValueError("the saved state of the floor estimator is of other sensors")
             for name, view in self._views.items():
-                saved = state["sensors"][name]
-                like, _ = view.background.save()
-                arrays = {key: unpack(saved["background"][key], array) for key, array in like.items()}
-                view.background.restore(arrays, saved)
-                view.last = saved["last"]
-                view.move(tuple(saved["pose"]))
+                view.restore(state["sensors"][name])
             self._association.restore(state["association"])
-            if "shoes" in state:
-                self._shoes[:] = unpack(state["shoes"], self._shoes)
-            self._tracks.absent.restore(state["absent"])
-            self._tracks.flickering.restore(state["flickering"])
-            self._tracks.strides = [(float(t), float(x), float(y), float(u)) for t, x, y, u in state.get("strides", ())]
+            self._shoes[:] = unpack(state["shoes"], self._shoes)
             self._prints[:] = unpack(state["prints"], self._prints)
-            self._objects.things[:] = unpack(state["things"], self._objects.things)
-            self._objects.visitors.restore(self._objects.things, state["visitors"])
-            self._objects.waiting = {
-                int(k): (float(rested), tuple((int(m), float(p)) for m, p in who))
-                for k, rested, who in state.get("waiting", ())
-            }
-            self._objects.robot_at = -np.inf if state["robot_at"] is None else float(state["robot_at"])
-            self._furniture.restore(state["furniture"])
-            self._furniture.legs = [(float(t), float(x), float(y)) for t, x, y in state.get("legs", ())]
+            for part in (self._tracks, self._objects, self._furniture):
+                part.restore(state)
             self._footprints.restore(state["footprints"])
             self._extrinsics.restore(state["extrinsics"])
             self._labels = int(state["labels"])

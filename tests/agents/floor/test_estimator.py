@@ -207,12 +207,13 @@ def test_two_sensors_see_one_thing_once_whichever_tells_first() -> None:
     assert math.dist(*seen) < 0.02
 
 
-def test_legs_of_moved_furniture_outlive_a_restart_and_a_state_saved_before_there_were_any_fits() -> None:
+def test_legs_of_moved_furniture_outlive_a_restart_and_a_state_without_them_is_damaged() -> None:
     room = Room()
     state = json.loads(json.dumps(room.play(3.0)[0].to_dict() | {"legs": [(1.0, 2.0, 3.0)]}))
     assert FloorEstimator.from_dict(state, room.sensors).to_dict()["legs"] == [(1.0, 2.0, 3.0)]
     del state["legs"]
-    assert FloorEstimator.from_dict(state, room.sensors).to_dict()["legs"] == []
+    with pytest.raises(ValueError, match="damaged"):
+        FloorEstimator.from_dict(state, room.sensors)
 
 
 def test_wrong_input_is_refused_and_loses_nothing() -> None:

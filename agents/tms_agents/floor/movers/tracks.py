@@ -10,12 +10,10 @@ import numpy as np
 
 from tms_agents.floor.association.association import OWN, Association
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
-from tms_agents.floor.feet.bodies import stuck
 from tms_agents.floor.feet.place import place, tell
 from tms_agents.floor.movers.absent import Absent
 from tms_agents.floor.movers.flickering import Flickering
-from tms_agents.floor.movers.lone import has_walked
-from tms_agents.floor.movers.pair import is_pair
+from tms_agents.floor.movers.reappearing import STEPS_S, missing_one
 from tms_agents.floor.movers.review import (
     BACK,
     BROAD,
@@ -36,7 +34,7 @@ from tms_agents.floor.movers.review import (
     review,
     unseen,
 )
-from tms_agents.floor.movers.twice import began, landed, suspect
+from tms_agents.floor.movers.twice import began, suspect
 from tms_agents.floor.movers.whereabouts import Whereabouts
 from tms_agents.floor.robots.recognizing import may_be_robot
 from tms_agents.floor.settings import FloorSettings, Scene
@@ -55,8 +53,6 @@ _SHOES_M, _PUSHED = 0.33, 0.2
 _ALONE = 0.3
 #: Who has stayed where he is for so long (s) when he is hidden stands on, also in a door.
 _RESTS_S = 2.0
-#: Somebody hidden may come out so far away (m), and may have walked so fast (m/s).
-_OUT_M, _SPEED = 0.5, 0.9
 #: Who has gone out of the room and is not seen for so long (s) has left.
 _THROUGH_S = 0.6
 #: Who is seen so far (m) outside the region has left the room; who comes is told when he is no farther (m) from it.
@@ -66,10 +62,6 @@ _SITS_S = 86400.0
 #: Who sits does so this far (m) from the edge of the seat, and for certain, if his feet have vanished in clear view for
 #: so long (s).
 _DEEP_M, _CLEAR_S = 0.25, 0.3
-#: A foot that leaves lands so far away (m) within so long (s).
-_STRIDE_M, _STEPS_S = 1.2, 0.6
-#: Who puts something down and is taken to stand on it has gone on within this (s).
-_STANDS_S = 5.0
 #: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
 _SHIFT_M, _BY_ITSELF_S, _HITS = 0.35, 2.0, 5
 
@@ -94,6 +86,16 @@ class Tracks:
     def bodies(self) -> Any:
         """All there may be in the best hypothesis, until the next scan."""
         return self._association.bodies
+
+    def save(self) -> dict[str, Any]:
+        """JSON values, without those of the association."""
+        return {"absent": self.absent.save(), "strides": self.strides, "flickering": self.flickering.save()}
+
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        self.absent.restore(saved["absent"])
+        self.flickering.restore(saved["flickering"])
+        self.strides = [(float(t), float(x), float(y), float(matters)) for t, x, y, matters in saved["strides"]]
 
     def review(
         self,
@@ -136,7 +138,7 @@ class Tracks:
                 label, xy, _ = self._tell(index, t)
                 events.append(Back(t, label, xy))
             elif action == CONFIRM:
-                missing = self._missing(body)
+                missing = missing_one(self.bodies, body, self._where, self.absent)
                 if not self._is_pushed(body, missing, legs):
                     events += self._confirm(index, missing, t, new_label, was_furniture)
             elif action == BROAD and (body["pushed"] > 0.8 or was_furniture(body)):
@@ -173,7 +175,7 @@ class Tracks:
         for since, x, y, _ in self.strides:
             for index, body in enumerate(self.bodies):
                 new = body["used"] and not body["confirmed"] and body["seen"] == t and body["from_furniture"] == 0
-                steps = body["first"] > since - _STEPS_S and body["hits"] >= _HITS and body["wide"] < 0.3
+                steps = body["first"] > since - STEPS_S and body["hits"] >= _HITS and body["wide"] < 0.3
                 likely = body["score"] >= 0.45 * body["hits"]
                 if new and steps and likely and math.hypot(body["x"] - x, body["y"] - y) < _SHIFT_M:
                     self._actions[index] = CONFIRM
@@ -340,42 +342,6 @@ class Tracks:
         """(label, place, covariance) of the mover, which is told now."""
         label, x, y, variance = tell(self.bodies, index, t)
         return label, (x, y), (variance, 0.0, variance)
-
-    def _stands(self, body: Any, new: Any) -> bool:
-        """Whether who shows one foot has stood there for long, and the ``new`` one stands, too, or may be another."""
-        t = float(new["seen"])
-        people = (self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1) & (self.bodies["robot"] == 0)
-        others = self.absent.waits or (people & (self.bodies["label"] != body["label"])).any()
-        return t - landed(body) > _STANDS_S and bool(others or is_pair(new, t))
-
-    def _missing(self, body: Any) -> int | None:
-        """Which mover not seen now this one most probably is: hidden, seated, or only thought to be seen."""
-        best, best_gap, where = None, 1.0, self._where
-        broad = body["wide"] > 0.3 or is_footless(body)
-        for index, other in enumerate(self.bodies):
-            if not (other["used"] and other["confirmed"]) or (other["machine"] and body["wide"] < 0.3):
-                continue
-            if broad and not other["robot"] and has_walked(other):
-                continue
-            x, y, seen = float(other["x"]), float(other["y"]), float(other["seen"])
-            steps = seen > body["first"] + 0.2
-            if steps:
-                lost = stuck(other, float(body["seen"]))
-                # Who stands on one foot, in view, is not who comes in by a door, nor who may be somebody else.
-                if lost is None or self._stands(other, body) or self.absent.enters(body):
-                    continue
-                x, y, seen = lost
-            since = max(0.0, float(body["first"]) - seen)
-            gap = math.hypot(body["x0"] - x, body["y0"] - y)
-            reach = _OUT_M + min(_SPEED * since, 1.2)
-            if steps and since < _STEPS_S:
-                reach = max(reach, _STRIDE_M)
-            for out_of_view, area in ((where.seated, where.seats), (where.masked, where.masks)):
-                if out_of_view(other) and not steps:
-                    gap, reach = min(gap, area.distance(body["x0"], body["y0"]) + 0.05), 0.7
-            if gap / reach < best_gap:
-                best, best_gap = index, gap / reach
-        return best
 
 
 def _xy(body: Any) -> tuple[float, float]:

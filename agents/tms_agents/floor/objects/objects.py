@@ -16,6 +16,7 @@ from tms_agents.floor.objects.visitors import Visitors
 from tms_agents.floor.robots.recognizing import has_robot
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.settings import FloorSettings
+from tms_agents.floor.state import pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -106,6 +107,25 @@ class Objects:
         #: Which went by themselves in the last scan, nobody being near: when they were seen last, x, y (m).
         self.walked: list[tuple[float, float, float]] = []
         self._ripe = np.zeros(0, np.int64)
+
+    def save(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "things": pack(self.things),
+            "visitors": self.visitors.save(self.things),
+            "waiting": [[k, rested, who] for k, (rested, who) in self.waiting.items()],
+            "robot_at": self.robot_at if math.isfinite(self.robot_at) else None,
+        }
+
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        self.things[:] = unpack(saved["things"], self.things)
+        self.visitors.restore(self.things, saved["visitors"])
+        self.waiting = {
+            int(k): (float(rested), tuple((int(mover), float(p)) for mover, p in who))
+            for k, rested, who in saved["waiting"]
+        }
+        self.robot_at = -math.inf if saved["robot_at"] is None else float(saved["robot_at"])
 
     def weigh(self, looks: Any, bodies: Any, t: float, dt: float) -> list[FloorEvent]:
         """Take in what a scan says (`freespace.look`) of each thing: removals."""

@@ -229,10 +229,12 @@ class Furniture:
             for other in pieces
         )
 
-    def save(self) -> list[list[float]]:
-        """What to keep across a restart."""
-        return [list(item) for item in self._found]
+    def save(self) -> dict[str, Any]:
+        """JSON values."""
+        return {"furniture": self._found, "legs": self.legs}
 
-    def restore(self, rows: list[list[float]]) -> None:
-        """Go on from what was kept."""
-        self._found = [(t, x, y) for t, x, y in rows]
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        self._found, self.legs = (
+            [(float(t), float(x), float(y)) for t, x, y in saved[name]] for name in ("furniture", "legs")
+        )

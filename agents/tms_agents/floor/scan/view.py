@@ -13,6 +13,7 @@ from tms_agents.floor.scan.background import Background
 from tms_agents.floor.scan.rays import rays, views
 from tms_agents.floor.scan.segmentation import Segmenter
 from tms_agents.floor.settings import FloorSettings, Point, Pose, Sensor
+from tms_agents.floor.state import pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,20 @@ class View:
         _clean(
             np.asarray(ranges, dtype=np.float64), max(sweep.range_min_m, 0.02), sweep.range_max_m - 1e-3, self.ranges
         )
+
+    def save(self) -> dict[str, Any]:
+        """JSON values."""
+        arrays, numbers = self.background.save()
+        packed = {name: pack(array) for name, array in arrays.items()}
+        return {"background": packed, **numbers, "pose": self.pose.tolist(), "last": self.last}
+
+    def restore(self, saved: Any) -> None:
+        """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        like, _ = self.background.save()
+        arrays = {name: unpack(saved["background"][name], array) for name, array in like.items()}
+        self.background.restore(arrays, saved)
+        self.last = saved["last"]
+        self.move(tuple(saved["pose"]))
 
     @property
     def sight(self) -> tuple[Any, ...]:
