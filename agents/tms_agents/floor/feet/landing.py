@@ -25,9 +25,10 @@ _UP = np.array([-0.73, -1.51, -1.24, -1.38, -1.17, 0.95, 1.06, 1.53, 0.85, 0.97,
 #: The same by how long ago (s) the other one has landed.
 _OTHER_S = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.5, 3.0])
 _OTHER = np.array([0.0, 0.81, -0.69, -1.35, -0.59, 0.25, 0.77, 0.52, -0.11, 0.03, 0.54, -0.17])
-#: That is fitted up to so long (s). Who has stood twice as long sets off half as often in one scan, and so on: so it is
-#: where some stand for seconds and some for minutes. Longer than this (s) is never: no other one has landed.
-_LONG_S, _NEVER_S = 3.0, 1e6
+#: That is fitted up to three seconds. Who has stood for longer than this (s), twice as long, sets off half as often in
+#: one scan, and so on: so it is where some stand for seconds and some for minutes. Sooner whoever only pauses between
+#: two ways loses his step to a passer. Longer than the second (s) is never: no other one has landed.
+_LONG_S, _NEVER_S = 10.0, 1e6
 #: It lands so far (m) ahead of the body, farther ahead by so much per m/s and per m that the other one is behind.
 _AHEAD_M, _PER_SPEED, _PER_LAG = -0.02, 0.26, 0.27
 #: Who goes on as he went: standard deviation (m) along and aside, and how much what is not known of the body counts.

@@ -86,11 +86,16 @@ def test_what_landed_some_scans_ago_is_judged_by_where_he_was_then() -> None:
     assert price(walker(), 0.05, age=0.2) < price(walker(), 0.45, age=0.2) - 1.0
 
 
-@pytest.mark.parametrize("stood", [3.0, 6.0, 24.0])
+@pytest.mark.parametrize("stood", [10.0, 20.0, 80.0])
 def test_who_has_stood_twice_as_long_sets_off_half_as_often(stood: float) -> None:
     standing = walker(speed=0.0)
     once, twice = (price(standing, 0.25, stood=seconds) for seconds in (stood, 2.0 * stood))
     assert twice - once == pytest.approx(math.log(2.0))
+
+
+def test_who_pauses_between_two_ways_sets_off_as_readily_after_nine_seconds_as_after_three() -> None:
+    standing = walker(speed=0.0)
+    assert price(standing, 0.25, stood=9.0) == price(standing, 0.25, stood=3.0)
 
 
 def test_who_shows_one_foot_alone_has_not_stood_on_the_other_for_ever() -> None:
