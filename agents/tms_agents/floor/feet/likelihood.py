@@ -15,7 +15,7 @@ from tms_agents.floor.feet.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, sca
 from tms_agents.floor.feet.build import LEGS_KNOWN, LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.feet.fitted import Legs, Shoes
 from tms_agents.floor.feet.landing import Way, way
-from tms_agents.floor.feet.one_foot import FRESH_S, UNLIKELY, Candidate, apart, one_foot
+from tms_agents.floor.feet.one_foot import FRESH_S, UNLIKELY, Candidate, OneFoot, apart, one_foot
 from tms_agents.floor.feet.prints import lay_before
 from tms_agents.floor.feet.shine import unlike
 from tms_agents.floor.norm import norm
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 #: Nobody's foot is farther away from the body than this (m), and no part of a robot.
 _REACH_M, _ROBOT_M = 1.3, 1.0
+#: Who goes slower than this (m/s), one foot in view until so long (s) ago, puts the other one no farther (m) from it.
+_STANDS_MPS, _IN_VIEW_S, _STEP_M = 0.3, 0.15, 1.0
 #: Who has sat down gets up with a foot so near (m) one of his.
 _RISES_M = 0.9
 #: Where hardly anything comes back a beam or two so near (m) one of his feet are it.
@@ -112,10 +114,19 @@ def _foot(
     one = Candidate(print_, age, lately, strange, base, too_wide(body, c), there)
     for which in range(2):
         foot = one_foot(body, which, t)
+        stays = print_ >= 0 and print_ == foot.print_
+        if not stays and speed < _STANDS_MPS and _out_of_step(c, foot, t):
+            continue
         if shod:
             cost[which] = shape + as_shoe(shoes, body, goes, c, foot, one, t)
         else:
             cost[which] = shape + as_leg(legs, body, speed, c, foot, one, t)
+
+
+@njit(cache=True, inline="always")
+def _out_of_step(c: Any, foot: OneFoot, t: float) -> bool:
+    """Whether the cluster is farther from where the other foot stands, in view, than who stands can step."""
+    return t - foot.other_seen < _IN_VIEW_S and norm(c.x - foot.other_x, c.y - foot.other_y) > _STEP_M
 
 
 @njit(cache=True)

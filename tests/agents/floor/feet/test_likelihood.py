@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from floor_prints import shows
 
+from tms_agents.floor.feet.likelihood import feet
 from tms_agents.floor.feet.nobodys import costs, goes_on
 from tms_agents.floor.scan.segmentation import CLUSTER, FADES
 from tms_agents.floor.state import BODY, PRINT, empty
@@ -88,6 +89,32 @@ def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ag
     costs(shows(clusters, prints, t, 0), np.ones(1, np.bool_), bodies, one, cost)
     landed, stands = cost[0, 0], cost[0, 1]
     assert stands < landed - 2.0
+
+
+@pytest.mark.parametrize("shoe", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("away", "speed", "seen", "may"),
+    [
+        (0.8, 0.0, 0.1, True),
+        (1.2, 0.0, 0.1, False),
+        (1.2, 0.6, 0.1, True),  # walks
+        (1.2, 0.0, 0.6, True),  # nobody sees where the other foot is now
+    ],
+)
+def test_who_stands_steps_no_farther_than_a_leg_is_long(
+    shoe: float, away: float, speed: float, seen: float, may: bool
+) -> None:
+    t = 10.0
+    bodies, prints, clusters = empty(BODY, 1), empty(PRINT, 1), np.zeros(1, CLUSTER)
+    body = bodies[0]
+    body["used"] = body["confirmed"] = 1
+    body["shoe"], body["at"], body["vx"], body["pp"], body["stride"] = shoe, t, speed, 0.02, 0.6
+    body["a_seen"], body["a_land"], body["a_print"] = t - 9.0, -1e9, -1
+    body["b_seen"], body["b_land"], body["b_print"] = t - seen, t - 8.0, 0
+    clusters["x"], clusters["width"], clusters["n"], clusters["mirror"] = away, 0.1, 6, -1
+    cost = np.zeros((1, 2))
+    feet(shows(clusters, prints, t), np.ones(1, np.bool_), bodies, 0, cost)
+    assert bool(cost[0, 0] < 100.0) == may
 
 
 @pytest.mark.parametrize(
