@@ -99,6 +99,15 @@ def test_brightness_is_that_of_what_rests_there_now() -> None:
     assert prints["shine_n"].tolist() == [1, 30, 30]
 
 
+@pytest.mark.parametrize(("width", "shines"), [(0.12, True), (0.25, False)])
+def test_two_feet_in_one_do_not_shine_as_one_of_them(width: float, shines: bool) -> None:
+    prints, clusters, marks = resting(HIS, HIS, HIS), np.zeros(1, CLUSTER), np.full((1, 4), OTHER)
+    prints["hits"], prints["width"] = 30, 0.1
+    clusters["n"], clusters["width"] = 9, width
+    note(prints, clusters, np.array([0]), marks)
+    assert (prints["shine"][0] != HIS) == shines
+
+
 def played(circles: list[tuple[float, Circle]], ranges: np.ndarray, room: Room) -> np.ndarray:
     """The light of each beam (n,): of the circle it meets, else of the wall."""
     (sensor,) = room.sensors.values()
