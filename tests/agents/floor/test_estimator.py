@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, FloorSettings, Scene, Sensor, Vanished
+from tms_agents.floor.scan.furniture import Furniture
 
 #: Somebody comes in at the right, stops in the middle, goes back.
 VISIT = [(9.0, 4.9, 2.0), (12.0, 2.2, 2.0), (14.0, 2.2, 2.0), (17.0, 4.9, 2.0)]
@@ -214,6 +215,14 @@ def test_legs_of_moved_furniture_outlive_a_restart_and_a_state_without_them_is_d
     del state["legs"]
     with pytest.raises(ValueError, match="damaged"):
         FloorEstimator.from_dict(state, room.sensors)
+
+
+def test_what_was_saved_stays_as_it_was() -> None:
+    furniture = Furniture()
+    furniture.legs.append((1.0, 2.0, 3.0))
+    saved = furniture.save()
+    furniture.legs.append((4.0, 5.0, 6.0))
+    assert saved["legs"] == [(1.0, 2.0, 3.0)]
 
 
 def test_wrong_input_is_refused_and_loses_nothing() -> None:

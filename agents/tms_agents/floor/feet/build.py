@@ -41,6 +41,8 @@ SHOD = 0.2
 _PLENTY, _ALL_LEGS, _ALL_SHOES = 150.0, 0.1, 0.45
 #: So many feet tell that legs are seen, if less than this share was as wide as a shoe: of simulated shoes 0.3 were.
 _FEW, _NO_SHOE = 50.0, 0.05
+#: What stands alone looks less than so many times, and so much (m), wider than it mostly does.
+_JOINED, _JOINED_M = 1.3, 0.03
 #: The toes and the heel of a shoe are that wide, as a share of its length (`sole`); both are in view if it looks so
 #: wide (m), and it points along the way (sine of the angle).
 _TOES, _SIDE_M, _ASTRAY = 0.3, 0.19, 0.5
@@ -104,6 +106,12 @@ def knows_feet(body: Any) -> bool:
 def from_side(c: Any) -> bool:
     """Whether the cluster, if a shoe, shows its heel and its toes."""
     return bool(c.cut == 0 and _SIDE_M < c.width < _SHOE_M[1])
+
+
+@njit(cache=True)
+def joined(c: Any, q: Any) -> bool:
+    """Whether the cluster is so much wider than what is known of the print that it is not of that alone."""
+    return bool(c.width >= _JOINED * q.width + _JOINED_M)
 
 
 @njit(cache=True)

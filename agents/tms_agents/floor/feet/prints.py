@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.feet.build import SHOD, SHOES
+from tms_agents.floor.feet.build import SHOD, SHOES, joined
 from tms_agents.floor.feet.shine import STRANGE, strangeness
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
@@ -151,7 +151,7 @@ def follow(
         off = norm(c.x - q.x, c.y - q.y)
         if _grown(q, c):
             q.idle = 0.0
-        if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and c.width < 1.3 * q.width + 0.03:
+        if off > _STATIC_M + 0.006 * c.near and not c.cut and q.hits > 0 and not joined(c, q):
             q.first, q.rested = t, t
             q.hits, q.looks, q.mutes, q.whole, q.covered, q.spread = 0, 0, 0, 0, 0, 0.0
             q.x, q.y, q.width, q.beams = c.x, c.y, c.width, c.n

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.feet.build import SURE
+from tms_agents.floor.feet.build import SURE, joined
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
@@ -32,8 +32,6 @@ _BEST, _STEADY = 0.1, 0.03
 _KNOWN, _ALONE_M = 120, 0.8
 #: A print that was seen so often is known, and as bright as somebody's feet up to so many standard deviations.
 _OFTEN, ALIKE = 5, 2.5
-#: A cluster so many times as wide as its print, and so much (m), is not of it alone.
-_JOINED, _JOINED_M = 1.3, 0.03
 #: What differs in brightness from somebody's feet by so many standard deviations is none of them.
 STRANGE = 4.0
 
@@ -82,9 +80,9 @@ def note(prints: Any, clusters: Any, of: NDArray[np.int64], marks: Array) -> Non
         q = prints[of[k]]
         if q.hits == 1:
             q.shine_n = 0
-        # Much wider than what is known of it: somebody else's foot is beside it.
-        joined = q.hits > _OFTEN and clusters[k].width > _JOINED * q.width + _JOINED_M
-        if (not clusters[k].cut or clusters[k].n > 1) and not joined and not np.isnan(marks[k, 0]):
+        # Somebody else's foot is beside it.
+        both = q.hits > _OFTEN and joined(clusters[k], q)
+        if (not clusters[k].cut or clusters[k].n > 1) and not both and not np.isnan(marks[k, 0]):
             q.shine_n = min(q.shine_n + 1, _MEMORY)
             q.shine += (marks[k, 0] - q.shine) / q.shine_n
 

@@ -17,8 +17,8 @@ from tms_agents.floor.movers.whereabouts import Whereabouts
 _STRIDE_M, STEPS_S = 1.2, 0.6
 #: Somebody hidden may come out so far away (m), and may have walked so fast (m/s), so far (m) at most.
 _OUT_M, _SPEED, _FARTHEST_M = 0.5, 0.9, 1.2
-#: Who gets up stands so near (m) where one can sit.
-_RISES_M = 0.7
+#: Who gets up, or comes out of what is masked, stands so near (m) there.
+_BESIDE_M = 0.7
 #: Who puts something down and is taken to stand on it has gone on within this (s).
 _STANDS_S = 5.0
 
@@ -47,7 +47,7 @@ def missing_one(bodies: Any, new: Any, where: Whereabouts, absent: Absent) -> in
             reach = max(reach, _STRIDE_M)
         for out_of_view, area in ((where.seated, where.seats), (where.masked, where.masks)):
             if out_of_view(body) and not steps:
-                gap, reach = min(gap, area.distance(new["x0"], new["y0"]) + 0.05), _RISES_M
+                gap, reach = min(gap, area.distance(new["x0"], new["y0"]) + 0.05), _BESIDE_M
         if gap / reach < best_gap:
             best, best_gap = index, gap / reach
     return best

@@ -89,7 +89,7 @@ class Tracks:
 
     def save(self) -> dict[str, Any]:
         """JSON values, without those of the association."""
-        return {"absent": self.absent.save(), "strides": self.strides, "flickering": self.flickering.save()}
+        return {"absent": self.absent.save(), "strides": list(self.strides), "flickering": self.flickering.save()}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""

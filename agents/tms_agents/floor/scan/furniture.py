@@ -231,7 +231,7 @@ class Furniture:
 
     def save(self) -> dict[str, Any]:
         """JSON values."""
-        return {"furniture": self._found, "legs": self.legs}
+        return {"furniture": list(self._found), "legs": list(self.legs)}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""

@@ -101,7 +101,7 @@ def test_what_has_stood_under_one_foot_is_not_where_the_other_has_landed_long_ag
         (1.2, 0.0, 0.6, True),  # nobody sees where the other foot is now
     ],
 )
-def test_who_stands_steps_no_farther_than_a_leg_is_long(
+def test_who_stands_with_one_foot_in_view_steps_no_farther_than_a_metre(
     shoe: float, away: float, speed: float, seen: float, may: bool
 ) -> None:
     t = 10.0
