@@ -222,6 +222,25 @@ def test_a_thing_is_no_piece_of_furniture_that_was_half_as_wide(piece: float, is
     assert Furniture().explains(put[0], put, [Piece(1.0, 2.5, 2.0, piece, 1.0)], 5.0) == is_it
 
 
+@pytest.mark.parametrize(
+    ("width", "away", "went", "is_it"),
+    [
+        (0.3, 0.25, 1.0, False),
+        (0.3, 0.25, -7.0, False),  # who pushed it stood before the other part
+        (0.3, 0.45, 1.0, True),  # another one
+        (0.3, 0.25, -30.0, True),  # that was long ago
+        (0.06, 0.15, 1.0, True),  # the smaller one is the part
+    ],
+)
+def test_a_part_of_what_was_pushed_is_not_a_piece_of_its_own(
+    width: float, away: float, went: float, is_it: bool
+) -> None:
+    box = thin((2.0, 2.0))
+    box["width"] = 0.1
+    gone = [Piece(1.0, 2.5, 2.0, 0.1, 1.0), Piece(went, 2.5 + away, 2.0, width, 1.0)]
+    assert Furniture().explains(box[0], box, gone, 5.0) == is_it
+
+
 @pytest.mark.parametrize(("widths", "lacks"), [((), False), ((0.02, 0.015), False), ((0.02, 0.03), True)])
 def test_an_edge_that_noise_hides_is_nothing_that_has_gone_from_the_room(
     widths: tuple[float, ...], lacks: bool

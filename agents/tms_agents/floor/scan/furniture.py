@@ -25,6 +25,8 @@ _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 #: Its width is the same within this (m) and as far as the beams tell.
 _THIN_WIDTH_M = 0.01
+#: Two pieces of one surface are so near each other (m), and one is seen to have gone so long (s) after the other.
+_BESIDE_M, _TOGETHER_GONE_S = 0.1, 15.0
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
 #: What was somebody's foot, and has not been seen for so long (s), was lifted.
@@ -176,7 +178,7 @@ class Furniture:
         """Whether the print is one of the ``pieces``."""
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
-        near = [p for p in near if print_["rested"] - p.t + _GONE_S > -_EARLY_S]
+        near = [p for p in near if print_["rested"] - p.t + _GONE_S > -_EARLY_S and not self._is_part(p, pieces)]
         best, best_cost = None, 1.0
         width, spacing = float(print_["width"]), float(print_["spacing"])
         for piece in near:
@@ -218,6 +220,16 @@ class Furniture:
         """Whether one of the ``pieces``, about so wide (m), had gone when what is so wide came to rest."""
         gone = [piece for piece in pieces if piece.whole and piece.t < rests_at + _EARLY_S]
         return any(abs(piece.width - width) < _ALIKE * width for piece in gone)
+
+    @staticmethod
+    def _is_part(piece: Piece, pieces: list[Piece]) -> bool:
+        """Whether a larger piece has gone from beside it: what was pushed is larger than this."""
+        return any(
+            other.width > piece.width
+            and abs(other.t - piece.t) < _TOGETHER_GONE_S
+            and math.hypot(other.x - piece.x, other.y - piece.y) < 0.5 * (piece.width + other.width) + _BESIDE_M
+            for other in pieces
+        )
 
     @staticmethod
     def _grouped(piece: Piece, pieces: list[Piece], thin: float) -> bool:
