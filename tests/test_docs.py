@@ -32,10 +32,9 @@ def test_a_heading_is_linked_as_github_does() -> None:
 def links(text: str) -> list[str]:
     """What the text links to or shows of this repository; not what it shows as code."""
     prose = re.sub(r"`[^`]*`", "", without_blocks(text))
-    found = re.findall(r"\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)", prose) + re.findall(
-        r'<img [^>]*src="([^"]+)"', prose
-    )
-    return [target for target in found if not re.match(r"[a-z]+:", target)]
+    linked = re.findall(r"\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)", prose)
+    shown = re.findall(r'<img [^>]*src="([^"]+)"', prose)
+    return [target for target in linked + shown if not re.match(r"[a-z]+:", target)]
 
 
 @cache
