@@ -103,6 +103,7 @@ def measured(seen: Cast, scans: int = 400, laser: Laser = FINE, seed: int = 0, *
 
 CLEAN: dict[str, Any] = {
     "isolated": 0.0, "intermittent": 0.0, "error_code": 0.0, "warm_up_m": 0.0, "drift_m": 0.0, "mixed": 0.0,
+    "longer": 0.0,
 }  # fmt: skip
 
 
@@ -113,6 +114,17 @@ def test_noise_is_as_large_as_on_recordings(range_m: float, low: float, high: fl
     common = off.mean(axis=1).std() * 1e3
     assert 0.7 <= common <= 1.5
     assert 1.3 <= (measured(still(range_m, cosine=0.17), **CLEAN) - range_m).std() / off.std() <= 2.5
+
+
+def test_each_device_measures_everything_too_long_or_too_short_all_its_life() -> None:
+    noise = {name: value for name, value in CLEAN.items() if name != "longer"}
+    shares = []
+    for seed in range(40):
+        near, far = (measured(still(r), scans=20, seed=seed, **noise).mean() / r - 1 for r in (1.0, 4.0))
+        assert near == pytest.approx(far, abs=0.001)
+        shares.append(far)
+    assert max(np.abs(shares)) < 0.0125
+    assert 0.005 < np.std(shares) < 0.009  # of five shared samples 0.0076
 
 
 def test_noise_of_neighbours_and_of_scans_that_follow_belongs_together_as_on_recordings() -> None:

@@ -50,7 +50,7 @@ _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
 #: Of saved states; 18: for how long who stays is thinner than feet, and how often feet land.
-_FORMAT = 18
+_FORMAT = 19
 
 
 class FloorEstimator:
@@ -107,6 +107,8 @@ class FloorEstimator:
         view.claimed[:] = False
         events: list[FloorEvent] = []
         if background.ready:
+            if view.range_scale is None:
+                view.compare(self._scene.region)
             events = self._understand(view, states, t, dt, _lights(intensities, view.n))
         background.learn(view.ranges, view.claimed, dt)
         self._outlook.look(list(self._views.values()), t, dt)

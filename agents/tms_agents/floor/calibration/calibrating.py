@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from tms_agents.clocks import Clocks
-from tms_agents.devices.scans import Scan
+from tms_agents.devices.scans import Array, Scan, Sweep
 from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.calibration.walkers import Registration, register, walker_tracks
-from tms_agents.floor.calibration.walls import MATCHED_M, Fit, fit_walls, static_points
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.lasers import Laser
 from tms_agents.floor.recordings.formats import read_scans
 from tms_agents.floor.recordings.recorded import Recorded, forward
 from tms_agents.floor.runner import listen
+from tms_agents.floor.scan.walls import MATCHED_M, Fit, fit_walls
 from tms_agents.floor.settings import FloorSettings, Pose
 from tms_client import Town, TownError
 from tms_client.cli import CommandError
@@ -116,6 +116,17 @@ def outline_of(config: FloorConfig, given: str | None) -> list[tuple[float, floa
     return list(outline)
 
 
+def static_points(sweep: Sweep, ranges: Array) -> Array:
+    """(n, 2) m in the sensor's frame of what stands still in scans (T, B): beams that mostly echo, at their median."""
+    found = np.isfinite(ranges)
+    steady = found.mean(axis=0) >= 0.5
+    if not steady.any():
+        return np.empty((0, 2))
+    middle = np.nanmedian(np.where(found, ranges, np.nan)[:, steady], axis=0)
+    angles = sweep.angles[steady]
+    return np.stack([middle * np.cos(angles), middle * np.sin(angles)], axis=1)
+
+
 def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Say, *, force: bool) -> Fit:
     """Raises CommandError where nothing fits well enough."""
     try:
@@ -127,6 +138,8 @@ def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Sa
     say(f"  {fit.matched:.0%} of {fit.points} beams end within {near:.0f} mm of a wall, RMSE {rmse:.1f} mm")
     x, y, turn = fit.sd[0] * 1000, fit.sd[1] * 1000, math.degrees(fit.sd[2])
     say(f"  uncertainty: x {x:.1f} mm, y {y:.1f} mm, {turn:.2f} degrees")
+    longer, sure = 100 * (1 / fit.range_scale - 1), 100 * fit.range_scale_sd
+    say(f"  it measures {longer:+.2f} % too long (+- {sure:.2f}); the agent finds that by [scene] region")
     if (fit.matched < _LEAST_MATCHED or fit.rmse_m > _MOST_RMSE_M) and not force:
         raise CommandError(
             f"laser {recorded.name}: that is no good fit; is the outline right, and the pose by ruler within "

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tms_agents.devices.scans import Array
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
-from tms_agents.floor.calibration.walls import wrapped
 from tms_agents.floor.recordings.recorded import Recorded
+from tms_agents.floor.scan.walls import wrapped
 from tms_agents.floor.settings import Pose
 
 #: Tracks are compared at this pace; those that are shorter tell nothing.

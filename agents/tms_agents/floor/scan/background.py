@@ -21,6 +21,8 @@ _COMPONENTS = 4
 _SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 #: A settled component weighs so much; what intermittent beams show less often is not believed.
 _WEIGHT = 0.06
+#: What a beam shows in more of the scans than this is what it mostly ends at.
+_MOSTLY = 0.5
 #: What is silent less often than this is missed where nothing comes back.
 _SILENT = 0.7
 
@@ -340,6 +342,20 @@ class Background:
             self.times,
             self.seen_at,
         )
+
+    def points(self, angles: Array) -> Array:
+        """(k, 2) m before the sensor: where the beams of these ``angles`` (n,) rad end that mostly end at one place."""
+        best = self.weight.argmax(axis=1)
+        beams = np.flatnonzero(self.weight.max(axis=1) > _MOSTLY)
+        ranges = self.centre[beams, best[beams]]
+        return np.stack([ranges * np.cos(angles[beams]), ranges * np.sin(angles[beams])], axis=1)
+
+    def stretch(self, scale: float) -> None:
+        """Everything is ``scale`` times as far as it was learned."""
+        self.centre *= scale
+        self.beyond_at *= scale
+        self.longest *= scale
+        self.steady *= scale
 
     def adopt(self, beams: NDArray[np.int64], ranges: Array, share: float = 0.3) -> None:
         """Something that stands there belongs to the room: (m,) beams and their ranges (m,) m."""

@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from tms_agents.floor.scan.background import Background
 from tms_agents.floor.scan.rays import rays, views
 from tms_agents.floor.scan.segmentation import Segmenter
-from tms_agents.floor.settings import FloorSettings, Point, Pose, Sensor
+from tms_agents.floor.scan.walls import range_scale
+from tms_agents.floor.settings import FloorSettings, Point, Polygon, Pose, Sensor
 from tms_agents.floor.state import pack, unpack
 
 Array = NDArray[np.float64]
 
 
 @njit(cache=True)
-def _clean(ranges: Array, nearest: float, farthest: float, out: Array) -> None:
-    """Error codes and NaN become NaN, what is beyond reach no echo (inf)."""
+def _clean(ranges: Array, nearest: float, farthest: float, scale: float, out: Array) -> None:
+    """Error codes and NaN become NaN, what is beyond reach no echo (inf), and the rest is ``scale`` times as far."""
     for i in range(ranges.size):
         r = ranges[i]
         if np.isnan(r) or r < nearest:
@@ -28,7 +29,7 @@ def _clean(ranges: Array, nearest: float, farthest: float, out: Array) -> None:
         elif r >= farthest:
             out[i] = np.inf
         else:
-            out[i] = r
+            out[i] = scale * r
 
 
 class View:
@@ -51,6 +52,8 @@ class View:
         self.ranges = np.zeros(self.n)
         self.claimed = np.zeros(self.n, np.bool_)
         self.last: float | None = None
+        #: What it measures times this is how far it is; nothing until `compare` has looked.
+        self.range_scale: float | None = None
         self.ways = views(sensor.pose, mirrors)
         self.move(sensor.pose)
 
@@ -61,23 +64,31 @@ class View:
 
     def take(self, ranges: Array) -> None:
         """Take in a scan (n,) m."""
-        sweep = self.sensor.sweep
-        _clean(
-            np.asarray(ranges, dtype=np.float64), max(sweep.range_min_m, 0.02), sweep.range_max_m - 1e-3, self.ranges
-        )
+        least = max(self.sensor.sweep.range_min_m, 0.02)
+        _clean(np.asarray(ranges, dtype=np.float64), least, self._reach_m, self.range_scale or 1.0, self.ranges)
+
+    def compare(self, outline: Polygon | None) -> None:
+        """Hold what the sensor measures against the walls of the room, if they are known, as soon as it sees them."""
+        self.range_scale = 1.0
+        if outline is not None:
+            points = self.background.points(np.asarray(self.sensor.sweep.angles, dtype=float))
+            self.range_scale = range_scale(points, outline, self.sensor.pose)
+            self.background.stretch(self.range_scale)
+            self.ranges *= self.range_scale
 
     def save(self) -> dict[str, Any]:
         """JSON values."""
         arrays, numbers = self.background.save()
         packed = {name: pack(array) for name, array in arrays.items()}
-        return {"background": packed, **numbers, "pose": self.pose.tolist(), "last": self.last}
+        own = {"pose": self.pose.tolist(), "last": self.last, "range_scale": self.range_scale}
+        return {"background": packed, **numbers, **own}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
         like, _ = self.background.save()
         arrays = {name: unpack(saved["background"][name], array) for name, array in like.items()}
         self.background.restore(arrays, saved)
-        self.last = saved["last"]
+        self.last, self.range_scale = saved["last"], saved["range_scale"]
         self.move(tuple(saved["pose"]))
 
     @property
@@ -89,6 +100,11 @@ class View:
     @property
     def reach(self) -> tuple[Array, float, Array, Array]:
         """What `sight.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
-        sweep = self.sensor.sweep
         farthest = np.minimum(self.background.longest, self.rays[:, 8])
-        return farthest, sweep.range_max_m - 1e-3, np.asarray(sweep.angles, dtype=float), self.pose
+        far = self._reach_m * (self.range_scale or 1.0)
+        return farthest, far, np.asarray(self.sensor.sweep.angles, dtype=float), self.pose
+
+    @property
+    def _reach_m(self) -> float:
+        """What measures more tells nothing."""
+        return self.sensor.sweep.range_max_m - 1e-3

@@ -17,9 +17,10 @@ class NoiseParameters:
 
     sigma: standard deviation (m) at the distances ``sigma_at_m``, linear between them; ``grazing`` is the factor at 90
     degrees of incidence (1 up to 60). ``moving_average`` correlates adjacent beams (lag 1 0.59, lag 2 0.22), ``memory``
-    adjacent scans. A beam of the ``intermittent`` share falls silent and stays so with the given probabilities. At
-    ``fades_at_m`` every other beam that meets something white is lost, more beyond it and fewer before; what is darker
-    is lost nearer, as its reflectivity by the power ``fades_power``.
+    adjacent scans. All that a device measures is too long or too short by up to the share ``longer``. A beam of the
+    ``intermittent`` share falls silent and stays so with the given probabilities. At ``fades_at_m`` every other beam
+    that meets something white is lost, more beyond it and fewer before; what is darker is lost nearer, as its
+    reflectivity by the power ``fades_power``.
     """
 
     sigma_at_m: tuple[float, ...] = (0.0, 3.0, 4.0, 5.6, 10.0)
@@ -28,6 +29,7 @@ class NoiseParameters:
     moving_average: tuple[float, float] = (0.7, 0.35)
     memory: float = 0.1
     common_m: float = 0.0011
+    longer: float = 0.012
     angle_jitter: float = 0.12  # of a scan, in steps between beams
     intermittent: float = 0.03
     silent_again: float = 0.82

@@ -35,6 +35,7 @@ class LaserErrors:
         self._scale = p.warm_up_m * rng.choice([-1.0, 1.0])
         self._wander = p.drift_m * rng.normal()
         self._at: float | None = None
+        self._longer = 1.0 + p.longer * rng.spawn(1)[0].uniform(-1.0, 1.0)
 
     def first_angle(self) -> float:
         """Of this sweep: the mirror does not start twice at the very same place."""
@@ -54,7 +55,7 @@ class LaserErrors:
         sigma = np.interp(near, p.sigma_at_m, p.sigma_m)
         steep = np.clip((np.arccos(np.clip(seen.cosines, 0, 1)) - math.pi / 3) / (math.pi / 6), 0, 1)
         sigma *= 1 + (p.grazing - 1) * steep
-        ranges = ranges + sigma * self._before + p.common_m * rng.normal() + drift
+        ranges = self._longer * ranges + sigma * self._before + p.common_m * rng.normal() + drift
         ranges = np.round(ranges / p.quantum_m) * p.quantum_m
         chance = rng.random((3, n))
         self._silent = self._intermittent & (chance[0] < np.where(self._silent, p.silent_again, p.silent_next))
