@@ -15,8 +15,9 @@ from tms_agents.floor.norm import norm
 
 #: What may be a foot is watched for so long (s): most people move one within this time.
 _WATCHED_S = 12.0
-#: What a hand has put there may be one if it is as wide as a shoe from its side (m), so near somebody (m) that it may
-#: be under him, as bright as the feet (standard deviations) of somebody beside it (m), or was somebody's just now (s).
+#: What a hand has put there may be one if it is as wide as a shoe from its side (m) and somebody is near, so near
+#: somebody (m) that it may be under him, as bright as the feet (standard deviations) of somebody beside it (m), or was
+#: somebody's just now (s).
 _SIDE_M, _UNDER_M, _LIKE, _BESIDE_M, _NOW_S = 0.17, 0.3, 1.0, 0.6, 0.2
 #: Of a leg behind somebody else's one sees a part. What is black or glossy is hardly ever seen whole either, and silent
 #: in so many scans.
@@ -41,8 +42,9 @@ def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> f
     """
     hardly = q.hits > HARDLY * q.whole and q.mutes < _MUTES
     if q.given:
-        foot = q.width > _SIDE_M or t - q.owned < _NOW_S or _may_be_foot(q, bodies, scattered)
-        part = hardly and q.spare < _PART_S and _somebody_near(q, bodies)
+        near = _somebody_near(q, bodies)
+        foot = (near and q.width > _SIDE_M) or t - q.owned < _NOW_S or _may_be_foot(q, bodies, scattered)
+        part = near and hardly and q.spare < _PART_S
         return _WATCHED_S if foot or part else 0.0
     if q.attached > _JOINED:
         return _JOINED_S

@@ -53,6 +53,11 @@ def test_what_a_hand_put_there_is_nobodys_leg_once_nobody_is_near() -> None:
     assert wanted(0.5, unseen_s=5.0, whole=0, given=1) > 10.0  # he may still be there, hidden
 
 
+def test_what_a_hand_put_there_is_nobodys_shoe_however_wide_once_nobody_is_near() -> None:
+    assert wanted(2.0, width=0.2, given=1) == wanted(width=0.2, given=1) == 0.0
+    assert wanted(0.5, unseen_s=5.0, width=0.2, given=1) > 10.0
+
+
 def test_what_a_hand_put_there_is_nobodys_leg_if_who_is_near_shows_both_elsewhere() -> None:
     assert wanted(0.5, whole=0, given=1, spare=5.0) == 0.0
     assert wanted(0.5, whole=0, given=1, spare=3.0) > 10.0
