@@ -1,7 +1,7 @@
 """Where a laser stands and how its ruler errs, from the walls of a room whose outline is known. Pure.
 
 Lasers of the class of a URG-04LX measure everything up to 1 % too long or too short (its data sheet; of five shared
-samples -1.1 to +0.7 %). One that sees walls on both sides of it tells both, where it stands and by how much.
+samples -0.8 to +0.9 %). One that sees walls on both sides of it tells both, where it stands and by how much.
 """
 
 from __future__ import annotations
