@@ -88,7 +88,8 @@ class View:
         like, _ = self.background.save()
         arrays = {name: unpack(saved["background"][name], array) for name, array in like.items()}
         self.background.restore(arrays, saved)
-        self.last, self.range_scale = saved["last"], saved["range_scale"]
+        self.last = saved["last"]
+        self.range_scale = None if saved["range_scale"] is None else float(saved["range_scale"])
         self.move(tuple(saved["pose"]))
 
     @property
