@@ -71,7 +71,7 @@ def _cabinet(arguments: argparse.Namespace) -> int:
 
 def _floor(arguments: argparse.Namespace) -> int:
     try:
-        from tms_agents.floor.calibration.poses import read_poses
+        from tms_agents.floor.calibration.poses import calibrated
         from tms_agents.floor.config import FloorConfig
         from tms_agents.floor.runner import run as run_floor
     except ImportError as error:
@@ -79,9 +79,8 @@ def _floor(arguments: argparse.Namespace) -> int:
             raise
         raise CommandError(f'the floor agent needs {error.name}: pip install "robot-town-tms[slam]"') from error
 
-    config = read_config(arguments.config, FloorConfig)
-    found = read_poses(config.calibration_path(arguments.config))
-    _run(config, run_floor(config, {name: one.pose for name, one in found.items()}, drain_s=_STOP_S))
+    config, poses = calibrated(read_config(arguments.config, FloorConfig), arguments.config)
+    _run(config, run_floor(config, poses, drain_s=_STOP_S))
     return 0
 
 

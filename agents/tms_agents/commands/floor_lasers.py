@@ -38,20 +38,21 @@ def calibrate(arguments: argparse.Namespace, clock: Callable[[], float] = time.t
             raise CommandError(f"--walkers {other.name!r}: that is the laser itself")
         there, here = _scans(arguments, config, [other.name, laser.name], 60.0)
         if other.name in known:
-            there = replace(there, pose=known[other.name].pose)
+            there = replace(there, pose=known[other.name].pose, range_scale=known[other.name].range_scale)
         found = by_walkers(there, here, config.settings(), _say, force=arguments.force)
-        pose, rmse = found.pose, found.rmse_m
+        pose, rmse, scale = found.pose, found.rmse_m, None
     else:
         outline = outline_of(config, arguments.outline)
         (here,) = _scans(arguments, config, [laser.name], 10.0)
         fit = by_walls(here, outline, _say, force=arguments.force)
-        pose, rmse = fit.pose, fit.rmse_m
+        pose, rmse, scale = fit.pose, fit.rmse_m, fit.known_scale
     calibration = LaserCalibration(
         x=round(pose[0], 5),
         y=round(pose[1], 5),
         theta=round(pose[2], 6),
         method="walls" if arguments.walkers is None else "walkers",
         rmse_m=round(rmse, 5),
+        range_scale=None if scale is None else round(scale, 5),
         measured_at=datetime.fromtimestamp(clock(), UTC),
     )
     old = write_poses(path, known | {laser.name: calibration})

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tms_agents.config import read_config
-from tms_agents.floor.calibration.poses import read_poses
+from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.recordings.formats import read_scans
 from tms_agents.floor.recordings.recorded import Recorded
@@ -41,14 +41,18 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
     Raises:
         CommandError: a file, the configuration or a pose cannot be used.
     """
-    like = None if arguments.config is None else read_config(arguments.config, FloorConfig)
-    poses = {} if like is None else poses_of(like, arguments.config)
+    like: FloorConfig | None = None
+    poses: dict[str, Pose] = {}
+    if arguments.config is not None:
+        like, poses = calibrated(read_config(arguments.config, FloorConfig), arguments.config)
+    scales = {} if like is None else {one.name: one.range_scale for one in like.lasers}
     recordings: list[Recorded] = []
     for one in [one for path in arguments.scans for one in read_scans(path)]:
         name, count = one.name, 2
         while name in [other.name for other in recordings]:
             name, count = f"{one.name} {count}", count + 1
-        recordings.append(changed(one, name=name, pose=poses.get(one.name, one.pose)))
+        pose, scale = poses.get(one.name, one.pose), scales.get(one.name)
+        recordings.append(changed(one, name=name, pose=pose, range_scale=scale))
     if arguments.pose:
         given = [_pose(text) for text in arguments.pose]
         if len(given) != len(recordings):
@@ -57,12 +61,6 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
         recordings = [changed(one, pose=pose) for one, pose in zip(recordings, given, strict=True)]
     config = config_of(recordings, like)
     return config, recordings
-
-
-def poses_of(config: FloorConfig, path: Path) -> dict[str, Pose]:
-    """Poses of the lasers by name: calibrated ones, otherwise those of the configuration."""
-    found = read_poses(config.calibration_path(path))
-    return {one.name: found[one.name].pose if one.name in found else one.pose.pose for one in config.lasers}
 
 
 def write_file(path: Path, data: bytes) -> None:

@@ -13,9 +13,10 @@ from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
 
-from tms_agents.commands.floor_replay import poses_of, recordings_of
+from tms_agents.commands.floor_replay import recordings_of
 from tms_agents.config import read_config
 from tms_agents.files import write_atomically
+from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.watch import watching
 from tms_agents.floor.watch.picture import frame_of, png
@@ -35,8 +36,7 @@ def watch(arguments: argparse.Namespace) -> int:
         return _watch_recordings(arguments)
     if arguments.config is None:
         raise CommandError("what shall be watched? --config of an agent, or recordings")
-    config = read_config(arguments.config, FloorConfig)
-    poses = poses_of(config, arguments.config)
+    config, poses = calibrated(read_config(arguments.config, FloorConfig), arguments.config)
     if arguments.once:
         asyncio.run(_once(arguments, config, poses))
         return 0

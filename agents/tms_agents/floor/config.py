@@ -43,6 +43,8 @@ class LaserSection(Section):
     upside_down: bool = False
     #: What is farther than this is not used.
     range_max_m: _Length | None = None
+    #: What it measures times this is how far it is; default: as calibrated, or as the walls of the region tell.
+    range_scale: Annotated[float, Field(gt=0.9, lt=1.1)] | None = None
 
 
 class SceneSection(Section):

@@ -143,7 +143,7 @@ class Floor:
             log.info("a laser is new or sweeps otherwise: the floor is learnt anew")
             self.labels.begin_anew()
             self._anew = True
-        self._sensors = {name: Sensor(sweep, self.lasers[name].pose) for name, sweep in sweeps.items()}
+        self._sensors = {name: self.lasers[name].sensor(sweep) for name, sweep in sweeps.items()}
         self.estimator = FloorEstimator(self._sensors, self.config.settings(), self.config.room_scene())
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
@@ -156,7 +156,7 @@ class Floor:
             for name, pose in saved["poses"].items():
                 if not np.allclose(pose, self.lasers[name].pose, atol=1e-6):
                     raise ValueError(f"laser {name} stands elsewhere now")
-            sensors = {name: Sensor(sweep, self.lasers[name].pose) for name, sweep in sweeps.items()}
+            sensors = {name: self.lasers[name].sensor(sweep) for name, sweep in sweeps.items()}
             estimator = FloorEstimator.from_dict(
                 saved["estimator"], sensors, self.config.settings(), self.config.room_scene()
             )

@@ -10,7 +10,7 @@ from tms_agents.devices.scans import Array, Scan, Sweep
 from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.config import LaserSection
 from tms_agents.floor.recordings.clock import ScanTimes
-from tms_agents.floor.settings import Pose
+from tms_agents.floor.settings import Pose, Sensor
 
 #: Blind or stuck for so long is a fault; a hand that passes the window is none.
 _FAULT_S = 2.0
@@ -50,6 +50,10 @@ class Laser:
         if self._own is None or not same_sweep(self._own[0], scan.sweep):
             self._own = scan.sweep, self._mounted(scan.sweep)
         return replace(scan, sweep=self._own[1])
+
+    def sensor(self, sweep: Sweep) -> Sensor:
+        """What the estimator is told of it."""
+        return Sensor(sweep, self.pose, self.section.range_scale)
 
     def usable(self, t: float, scan: Scan) -> bool:
         """Whether the scan says anything about the room; where not for long, ``state`` says why not."""

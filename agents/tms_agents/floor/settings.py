@@ -15,10 +15,18 @@ Pose = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """A laser: how it sweeps and where it is in the room (x m, y m, heading rad, counter-clockwise)."""
+    """A laser: how it sweeps and where it is in the room (x m, y m, heading rad, counter-clockwise).
+
+    ``range_scale``: what it measures times this is how far it is (None: as the walls of a known region tell).
+    """
 
     sweep: Sweep
     pose: Pose
+    range_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.range_scale is not None and not 0.9 < self.range_scale < 1.1:
+            raise ValueError("no laser measures a tenth too long or too short")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,12 @@ import pytest
 from floor_rig import COMES, GONE, OUTLINE, PUT_AT, QUICK, Room, config_toml, laser_toml, story, sweep
 from PIL import Image
 
+from tms_agents.config import read_config
 from tms_agents.devices.emulation import TcpLine
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.scip import ScipDevice
-from tms_agents.floor.calibration.poses import read_poses
+from tms_agents.floor.calibration.poses import calibrated, read_poses
+from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.recordings.formats import read_scans
 from tms_agents.floor.recordings.recording import ScanWriter
 from tms_agents.floor.watch.canvas import Canvas
@@ -206,6 +208,32 @@ def read_png(data: bytes) -> tuple[int, int, np.ndarray]:
     with Image.open(io.BytesIO(data)) as image:
         assert (image.format, image.mode) == ("PNG", "P")
         return image.width, image.height, np.asarray(image)
+
+
+def test_a_laser_that_measures_too_long_is_found_out_and_understood(story_scans, tmp_path, capsys):
+    """By the file beside the configuration, though that does not tell the room."""
+    scans, config = tmp_path / "long.scans", tmp_path / "floor.toml"
+    (recorded,) = read_scans(story_scans / "story.scans")
+    writer = ScanWriter(scans)
+    for t, ranges in zip(recorded.t, recorded.ranges, strict=True):
+        writer.add("laser", POSE, t, Scan(SWEEP, 1.01 * ranges))
+    writer.close()
+    config.write_text((story_scans / "floor.toml").read_text())
+
+    def away_m():
+        out = tmp_path / "out.json"
+        assert cli.main(["floor", "replay", str(scans), "--config", str(config), "--out", str(out)]) == 0
+        (told,) = [one for one in json.loads(out.read_text())[-1]["labels"] if one["attr"] == "object"]
+        return math.dist((told["x"], told["y"]), POSE[:2])
+
+    before = away_m()
+    outline = " ".join(f"{x},{y}" for x, y in OUTLINE)
+    arguments = ["floor", "calibrate", "--config", str(config), "--outline", outline, "--scans", str(scans)]
+    assert cli.main(arguments) == 0
+    assert "it measures +1.00 % too long" in capsys.readouterr().out
+    found, _ = calibrated(read_config(config, FloorConfig), config)
+    assert found.lasers[0].range_scale == pytest.approx(1 / 1.01, abs=2e-4)
+    assert before / away_m() == pytest.approx(1.01, abs=0.001)
 
 
 def test_a_picture_that_others_can_read():

@@ -139,7 +139,8 @@ def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Sa
     x, y, turn = fit.sd[0] * 1000, fit.sd[1] * 1000, math.degrees(fit.sd[2])
     say(f"  uncertainty: x {x:.1f} mm, y {y:.1f} mm, {turn:.2f} degrees")
     longer, sure = 100 * (1 / fit.range_scale - 1), 100 * fit.range_scale_sd
-    say(f"  it measures {longer:+.2f} % too long (+- {sure:.2f}); the agent finds that by [scene] region")
+    unknown = "" if fit.known_scale is not None else ", which is not sure enough to go by"
+    say(f"  it measures {longer:+.2f} % too long (+- {sure:.2f}){unknown}")
     if (fit.matched < _LEAST_MATCHED or fit.rmse_m > _MOST_RMSE_M) and not force:
         raise CommandError(
             f"laser {recorded.name}: that is no good fit; is the outline right, and the pose by ruler within "

@@ -42,7 +42,7 @@ class Registration:
 
 def walker_tracks(recorded: Recorded, pose: Pose, settings: FloorSettings | None = None) -> list[Track]:
     """The walkers that one laser saw, were it at ``pose``."""
-    estimator = FloorEstimator({recorded.name: Sensor(recorded.sweep, pose)}, settings)
+    estimator = FloorEstimator({recorded.name: Sensor(recorded.sweep, pose, recorded.range_scale)}, settings)
     found: dict[int, list[tuple[float, float, float]]] = {}
     for n in range(len(recorded)):
         t = float(recorded.t[n])

@@ -22,7 +22,8 @@ _FAR_M = 0.0
 class Recorded:
     """Scans of one sensor: ``t`` (T,) s of the first beams, rising, ``ranges`` (T, B) m as in ``Scan``.
 
-    ``pose`` is that of the sensor in the room: x, y in metres, yaw in radians.
+    ``pose`` is that of the sensor in the room: x, y in metres, yaw in radians; ``range_scale``: what it measures times
+    this is how far it is, if that is known.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Recorded:
     t: Array
     ranges: Array
     intensities: Array | None = None
+    range_scale: float | None = None
 
     def __len__(self) -> int:
         return len(self.t)

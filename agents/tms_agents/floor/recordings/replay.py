@@ -18,8 +18,8 @@ class Replay:
         """Raises ValueError where the recordings cannot be of one run, or no estimator can use them."""
         self.recordings = list(recordings)
         self._names = _names(self.recordings)
-        sensors = {name: Sensor(one.sweep, one.pose) for name, one in zip(self._names, self.recordings, strict=True)}
-        self.estimator = FloorEstimator(sensors, settings, scene)
+        sensors = [Sensor(one.sweep, one.pose, one.range_scale) for one in self.recordings]
+        self.estimator = FloorEstimator(dict(zip(self._names, sensors, strict=True)), settings, scene)
         self.scans = sum(map(len, self.recordings))
 
     def play(self) -> Iterator[tuple[str, float, int, list[FloorEvent]]]:

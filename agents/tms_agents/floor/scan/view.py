@@ -52,8 +52,8 @@ class View:
         self.ranges = np.zeros(self.n)
         self.claimed = np.zeros(self.n, np.bool_)
         self.last: float | None = None
-        #: What it measures times this is how far it is; nothing until `compare` has looked.
-        self.range_scale: float | None = None
+        #: What it measures times this is how far it is; nothing until that is known.
+        self.range_scale = sensor.range_scale
         self.ways = views(sensor.pose, mirrors)
         self.move(sensor.pose)
 
@@ -89,7 +89,10 @@ class View:
         arrays = {name: unpack(saved["background"][name], array) for name, array in like.items()}
         self.background.restore(arrays, saved)
         self.last = saved["last"]
-        self.range_scale = None if saved["range_scale"] is None else float(saved["range_scale"])
+        scale = None if saved["range_scale"] is None else float(saved["range_scale"])
+        if self.sensor.range_scale is not None and self.sensor.range_scale != scale:
+            raise ValueError("the saved background is of a sensor that measured otherwise")
+        self.range_scale = scale
         self.move(tuple(saved["pose"]))
 
     @property

@@ -51,6 +51,11 @@ class Fit:
     matched: float
     points: int
 
+    @property
+    def known_scale(self) -> float | None:
+        """The scale, if the walls tell it: of walls that are none what is near them is off by more than noise."""
+        return self.range_scale if self.range_scale_sd < _SURE and self.matched >= _AT_WALLS else None
+
 
 def fit_walls(points: Array, outline: Sequence[tuple[float, float]], start: Pose) -> Fit:
     """The pose near ``start`` (half a metre, 30 degrees) at which most points (n, 2) lie on the outline (a polygon).
@@ -82,9 +87,8 @@ def range_scale(points: Array, outline: Sequence[tuple[float, float]], pose: Pos
         fit = _judged(points, walls, _settled(_spaced(points), walls, pose, _REACH_M[2:]))
     except ValueError:
         return 1.0
-    # Of walls that are none what is near them is off by more than noise.
-    sure = fit.range_scale_sd < _SURE and fit.matched >= _AT_WALLS and math.dist(fit.pose[:2], pose[:2]) < _MOVED_M
-    return fit.range_scale if sure else 1.0
+    here = math.dist(fit.pose[:2], pose[:2]) < _MOVED_M
+    return fit.known_scale or 1.0 if here else 1.0
 
 
 def _require(points: Array) -> None:

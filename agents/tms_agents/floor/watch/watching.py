@@ -108,6 +108,7 @@ def config_of(recordings: Sequence[Recorded], like: FloorConfig | None = None) -
                 "source": {"kind": "scip", "device": "/dev/null"},
                 "pose": {"x": x, "y": y, "theta": float(np.arctan2(np.sin(theta), np.cos(theta)))},
                 "range_max_m": None if old is None else old.range_max_m,
+                "range_scale": one.range_scale,
             }
         )
     base: dict[str, Any] = {"agent": "recording", "room": "recording", "spool": {"path": "recording.spool"}}

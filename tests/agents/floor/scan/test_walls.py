@@ -65,6 +65,18 @@ def test_who_sees_walls_on_one_side_of_it_may_stand_elsewhere_instead() -> None:
     assert range_scale(ahead, OUTLINE, (2.5, 2.0, 0.0)) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_scale_that_is_told_counts_whatever_the_walls_are_and_nothing_learned_with_another_one() -> None:
+    room, told = Room(), {"A": Sensor(WIDE, (0.05, 0.05, math.pi / 4), 1.01)}
+    estimator, _ = Room(sensors=told).play(8.0, FloorEstimator(told, scene=Scene(region=OUTLINE)))
+    walls = estimator.to_dict()
+    assert walls["sensors"]["A"]["range_scale"] == 1.01
+    other = {"A": Sensor(WIDE, (0.05, 0.05, math.pi / 4), 0.99)}
+    with pytest.raises(ValueError, match="measured otherwise"):
+        FloorEstimator.from_dict(walls, other)
+    with pytest.raises(ValueError, match="a tenth"):
+        Sensor(WIDE, room.sensors["A"].pose, 1.2)
+
+
 @pytest.mark.parametrize(("region", "near_m", "far_m"), [(OUTLINE, 0.0, 0.012), (None, 0.03, 0.05)])
 def test_a_thing_is_where_it_is_though_the_laser_measures_everything_too_long(
     region: Sequence[tuple[float, float]] | None, near_m: float, far_m: float
