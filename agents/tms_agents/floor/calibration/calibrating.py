@@ -138,7 +138,7 @@ def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Sa
     say(f"  {fit.matched:.0%} of {fit.points} beams end within {near:.0f} mm of a wall, RMSE {rmse:.1f} mm")
     x, y, turn = fit.sd[0] * 1000, fit.sd[1] * 1000, math.degrees(fit.sd[2])
     say(f"  uncertainty: x {x:.1f} mm, y {y:.1f} mm, {turn:.2f} degrees")
-    longer, sure = 100 * (1 / fit.range_scale - 1), 100 * fit.range_scale_sd
+    longer, sure = round(100 * (1 / fit.range_scale - 1), 2) + 0.0, 100 * fit.range_scale_sd
     unknown = "" if fit.known_scale is not None else ", which is not sure enough to go by"
     say(f"  it measures {longer:+.2f} % too long (+- {sure:.2f}){unknown}")
     if (fit.matched < _LEAST_MATCHED or fit.rmse_m > _MOST_RMSE_M) and not force:

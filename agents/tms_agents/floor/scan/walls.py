@@ -88,7 +88,7 @@ def range_scale(points: Array, outline: Sequence[tuple[float, float]], pose: Pos
     except ValueError:
         return 1.0
     here = math.dist(fit.pose[:2], pose[:2]) < _MOVED_M
-    return fit.known_scale or 1.0 if here else 1.0
+    return (fit.known_scale or 1.0) if here else 1.0
 
 
 def _require(points: Array) -> None:
