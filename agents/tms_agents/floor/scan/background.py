@@ -149,6 +149,7 @@ def _learn(
     beyond: Array,
     beyond_at: Array,
     missing: Array,
+    gone_at: Array,
     seconds: float,
     times: Array,
     seen_at: Array,
@@ -158,7 +159,7 @@ def _learn(
     usual: by how much this scan counts, slow: where it shows something nearer than the background; pull: by how much
     the nearest component follows. ``beyond`` (n,) s counts how long a beam has passed its background and ``beyond_at``
     (n,) m where to: then the background there has gone. ``missing`` (n, k) s is for how long beams have passed the
-    place of a component since it was last seen. ``times`` (n, k) is how often each was seen, ``seen_at`` (n, k) when
+    place of a component since it was last seen, ``gone_at`` (n, k) when they first did. ``times`` (n, k) is how often each was seen, ``seen_at`` (n, k) when
     last, ``seconds`` the time now.
     """
     n, k = centre.shape
@@ -186,6 +187,8 @@ def _learn(
         for j in range(k):
             weight[i, j] *= 1.0 - rate
             if weight[i, j] > 0.0 and r > centre[i, j] + max(threshold, sigmas * sigma[i, j]):
+                if missing[i, j] == 0.0:
+                    gone_at[i, j] = seconds
                 missing[i, j] += dt
         if best >= 0:
             if states[i] != FOREGROUND:
@@ -261,7 +264,7 @@ class Background:
         self.beyond_at = np.zeros(n)
         self.states = np.zeros(n, np.int8)
         self.longest, self.steady = np.full(n, np.inf), np.full(n, np.inf)
-        self.missing = np.zeros((n, _COMPONENTS))
+        self.missing, self.gone_at = np.zeros((n, _COMPONENTS)), np.zeros((n, _COMPONENTS))
         self.times, self.seen_at = np.zeros((n, _COMPONENTS)), np.zeros((n, _COMPONENTS))
         self.seconds = 0.0
         self._back = np.zeros(n, np.bool_)
@@ -338,6 +341,7 @@ class Background:
             self.beyond,
             self.beyond_at,
             self.missing,
+            self.gone_at,
             self.seconds,
             self.times,
             self.seen_at,
@@ -372,7 +376,7 @@ class Background:
 
     # --- across restarts
 
-    _ARRAYS = ("centre", "sigma", "weight", "empty", "beyond", "beyond_at", "missing", "times", "seen_at")
+    _ARRAYS = ("centre", "sigma", "weight", "empty", "beyond", "beyond_at", "missing", "gone_at", "times", "seen_at")
 
     def save(self) -> tuple[dict[str, Array], dict[str, float]]:
         """Arrays and numbers to keep."""

@@ -47,7 +47,7 @@ _EARLY_S = 2.0
 
 @dataclass(slots=True)
 class Piece:
-    """A piece of the background that is not there now: where it was, ``width`` m wide, and when it went.
+    """A piece of the background that is not there now: where it was, ``width`` m wide, and when its place was free.
 
     ``whole``: nothing of its surface is still there, or hidden.
     """
@@ -87,23 +87,28 @@ def _bridged(centre: Array, weight: Array, last: int, i: int, r: float, step: fl
 
 
 @njit(cache=True)
-def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: float, t: float, out: Array) -> int:
-    """Group missing components of neighbouring beams to rows of ``out`` (m, 5), as `Piece`; how many."""
+def _pieces(
+    centre: Array, weight: Array, missing: Array, gone_at: Array, rays: Array, step: float, late: float, out: Array
+) -> int:
+    """Group missing components of neighbouring beams to rows of ``out`` (m, 5), as `Piece`; how many.
+
+    ``late``: what to add to ``gone_at`` (n, k) s for the time of scans.
+    """
     n, k = centre.shape
     count = 0
     last, last_r, first_r = -10, 0.0, 0.0
     first, x, y, r_sum, beams, gone = 0, 0.0, 0.0, 0.0, 0, 0.0
     for i in range(n + 1):
-        r, seconds = 0.0, 0.0
+        r, at = 0.0, 0.0
         if i < n:
             for j in range(k):
                 if weight[i, j] > _WEIGHT and missing[i, j] > _GONE_S and (r == 0.0 or centre[i, j] < r):
-                    r, seconds = centre[i, j], missing[i, j]
+                    r, at = centre[i, j], gone_at[i, j]
         joined = r > 0.0 and beams > 0 and abs(r - last_r) < 0.12
         joined = joined and _bridged(centre, weight, last, i, min(r, last_r), step)
         if beams > 0 and not joined and (r > 0.0 or i == n or not _bridged(centre, weight, last, i, last_r, step)):
             if count < out.shape[0]:
-                out[count, 0] = t - gone / beams
+                out[count, 0] = late + gone / beams
                 out[count, 1], out[count, 2] = x / beams, y / beams
                 out[count, 3] = (last - first + 1) * step * r_sum / beams
                 left = _goes_on(centre, weight, first - 1, first_r) and _goes_on(centre, weight, first - 2, first_r)
@@ -117,7 +122,7 @@ def _pieces(centre: Array, weight: Array, missing: Array, rays: Array, step: flo
             x += rays[i, 0] + r * rays[i, 2]
             y += rays[i, 1] + r * rays[i, 3]
             r_sum += r
-            gone += seconds
+            gone += at
             beams += 1
             last, last_r = i, r
     return count
@@ -159,7 +164,8 @@ class Furniture:
     def pieces(self, view: Any, t: float) -> list[Piece]:
         """What has gone from the background of the sensor."""
         b = view.background
-        count = _pieces(b.centre, b.weight, b.missing, view.rays, abs(view.step), t, self._rows)
+        late = t - b.seconds
+        count = _pieces(b.centre, b.weight, b.missing, b.gone_at, view.rays, abs(view.step), late, self._rows)
         return [Piece(*row) for row in self._rows[:count].tolist()]
 
     def explains(self, print_: Any, prints: Any, pieces: list[Piece], t: float) -> bool:

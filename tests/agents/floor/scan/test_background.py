@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tms_agents.floor.scan.background import BACKGROUND, BEYOND, FOREGROUND, NO_ECHO, UNKNOWN, Background
+from tms_agents.floor.scan.furniture import Furniture
 from tms_agents.floor.settings import FloorSettings
 
 NOBODY = np.zeros(30, np.bool_)
@@ -59,6 +61,24 @@ def test_what_has_gone_is_raised_soon_and_what_returns_is_known(learned: Backgro
     assert learned.classify(np.full(30, 4.0))[0] == BACKGROUND
     assert learned.classify(np.full(30, 3.5))[0] == FOREGROUND
     assert learned.classify(np.full(30, 3.0))[0] == BACKGROUND
+
+
+@pytest.mark.parametrize("hidden_s", [0.0, 60.0])
+def test_a_piece_has_gone_since_its_place_was_free_however_long_it_was_hidden_then(
+    learned: Background, hidden_s: float
+) -> None:
+    scan = np.full(30, 3.0)
+    scan[12:16] = 4.0
+    learn(learned, scan, 2.0)
+    scan[10:18] = 1.0
+    for _ in range(round(10 * hidden_s)):
+        learned.classify(scan)
+        learned.learn(scan, scan == 1.0, 0.1)
+    angles = np.radians(0.5) * np.arange(30)
+    rays = np.stack([np.zeros(30), np.zeros(30), np.cos(angles), np.sin(angles)], axis=1)
+    view = SimpleNamespace(background=learned, rays=rays, step=math.radians(0.5))
+    (piece,) = Furniture().pieces(view, 500.0)
+    assert piece.t == pytest.approx(500.0 - hidden_s - 2.0, abs=0.11)
 
 
 def test_it_follows_a_slow_drift(learned: Background) -> None:
