@@ -159,8 +159,8 @@ def _learn(
     usual: by how much this scan counts, slow: where it shows something nearer than the background; pull: by how much
     the nearest component follows. ``beyond`` (n,) s counts how long a beam has passed its background and ``beyond_at``
     (n,) m where to: then the background there has gone. ``missing`` (n, k) s is for how long beams have passed the
-    place of a component since it was last seen, ``gone_at`` (n, k) when they first did. ``times`` (n, k) is how often each was seen, ``seen_at`` (n, k) when
-    last, ``seconds`` the time now.
+    place of a component since it was last seen, ``gone_at`` (n, k) when they first did. ``times`` (n, k) is how often
+    each was seen, ``seen_at`` (n, k) when last, ``seconds`` the time now.
     """
     n, k = centre.shape
     for i in range(n):
@@ -231,8 +231,9 @@ def _adopt(
     sigma: Array,
     weight: Array,
     empty: Array,
+    missing: Array,
 ) -> None:
-    """Make ``ranges`` (m,) m the background of ``beams`` (m,) with the weight ``share``, in place."""
+    """Make ``ranges`` (m,) m, seen now, the background of ``beams`` (m,) with the weight ``share``, in place."""
     for b in range(beams.size):
         i, r = beams[b], ranges[b]
         target = 0
@@ -242,6 +243,7 @@ def _adopt(
                 break
             if weight[i, j] < weight[i, target]:
                 target = j
+        missing[i, target] = 0.0
         if weight[i, target] >= share:
             continue
         for j in range(centre.shape[1]):
@@ -372,6 +374,7 @@ class Background:
             self.sigma,
             self.weight,
             self.empty,
+            self.missing,
         )
 
     # --- across restarts
