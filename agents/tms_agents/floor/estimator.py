@@ -49,7 +49,7 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 20: when pieces of the background have gone.
+#: Of saved states; 20: when pieces of the background have gone, and what sensors tell of each other's scales.
 _FORMAT = 20
 
 
@@ -78,7 +78,8 @@ class FloorEstimator:
         self._furniture = Furniture()
         self._footprints = Footprints(self._scene.robots, self._gates, self._association)
         self._robots = sizes(self._scene.robots)
-        self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()])
+        told = [bool(self._scene.region) or sensor.range_scale is not None for sensor in sensors.values()]
+        self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()], told)
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
         self._marks = np.zeros((256, 4))
@@ -121,6 +122,10 @@ class FloorEstimator:
     def poses(self) -> dict[str, Pose]:
         """Where the sensors are: as given, refined by what several of them have seen of the same walkers."""
         return {name: self._extrinsics.pose(view.index) for name, view in self._views.items()}
+
+    def range_scales(self) -> dict[str, float]:
+        """What each sensor measures times this is how far it is: as given, as the walls tell, as other sensors tell."""
+        return {name: view.scale for name, view in self._views.items()}
 
     def _understand(self, view: View, states: NDArray[np.int8], t: float, dt: float, lights: Array) -> list[FloorEvent]:
         bodies, prints = self._association.bodies, self._prints
@@ -172,6 +177,7 @@ class FloorEstimator:
         if len(self._views) > 1 and self._extrinsics.see(view.index, clusters, of, prints, t):
             for other in self._views.values():
                 other.move(self._extrinsics.pose(other.index))
+                other.refine(self._extrinsics.scale(other.index))
         vanished = objects.weigh(self._looks, bodies, t, dt)
         self._tracks.stepped(objects.walked, t)
         movers = self._tracks.review(

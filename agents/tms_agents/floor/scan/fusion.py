@@ -1,8 +1,9 @@
-"""Where the sensors really are: feet that several of them see at once tell by how much their poses disagree."""
+"""Where the sensors really are, and how far what they measure really is: feet that several see at once tell."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,23 +15,30 @@ Array = NDArray[np.float64]
 
 #: Poses are given about so well (m, rad); one sighting is so good (m), and sightings of one foot resemble each other.
 _PLACE_M, _TURN_RAD, _SIGHT_M, _SHARE = 0.03, 0.012, 0.03, 0.15
+#: A ruler errs by so much, of which nothing is known, and where walls or a calibration have told.
+_RULER, _TOLD = 0.008, 0.0005
 #: Sightings of one place belong together within this time (s) and distance (m).
 _SOON_S, _NEAR_M = 0.25, 0.15
-#: The poses are revised this often (s); old sightings fade by this factor each time.
-_EVERY_S, _FADE = 10.0, 0.98
+#: The poses are revised this often (s), if they change by so much (m, rad, share); old sightings fade by this factor
+#: each time.
+_EVERY_S, _LEAST, _FADE = 10.0, 5e-4, 0.98
 
 
 class Extrinsics:
-    """Corrections of the poses of all sensors but the first: weighted least squares, the given poses as prior."""
+    """Corrections of what each sensor measures, and of the poses of all but the first: it is what tells where all are.
 
-    def __init__(self, poses: list[Pose]) -> None:
-        self._given = [np.array(pose) for pose in poses]
+    Weighted least squares, what is given as prior. ``told`` (n,): whether the scale of a sensor is known.
+    """
+
+    def __init__(self, poses: Sequence[Pose], told: Sequence[bool]) -> None:
+        self._given = np.array(poses, dtype=float)
         count = len(poses)
-        prior = np.diag([_PLACE_M**-2, _PLACE_M**-2, _TURN_RAD**-2])
-        self._prior = prior
-        self._information = np.zeros((count, 3, 3))
-        self._evidence = np.zeros((count, 3))
-        self.corrections = np.zeros((count, 3))
+        sd = np.ravel([(_PLACE_M, _PLACE_M, _TURN_RAD, _TOLD if known else _RULER) for known in told])
+        self._prior = np.diag(sd**-2)
+        self._information = np.zeros((4 * count, 4 * count))
+        self._evidence = np.zeros(4 * count)
+        #: Of each sensor: x, y (m), heading (rad), and by which share it measures too little.
+        self.corrections = np.zeros((count, 4))
         self._sights: dict[int, dict[int, tuple[float, float, float]]] = {}
         self._revised = -math.inf
 
@@ -38,7 +46,8 @@ class Extrinsics:
         """Take in the clusters (m,) of a scan of ``sensor`` and their prints; whether the poses have been revised."""
         for k in range(clusters.size):
             c, index = clusters[k], int(of[k])
-            if index < 0 or c["cut"] or c["n"] < 3 or c["width"] > 0.3 or prints[index]["hits"] < 2:
+            unfit = c["cut"] or c["n"] < 3 or c["width"] > 0.3 or c["mirror"] >= 0
+            if index < 0 or unfit or prints[index]["hits"] < 2:
                 continue
             sights = self._sights.setdefault(index, {})
             here = (t, float(c["x"]), float(c["y"]))
@@ -54,37 +63,39 @@ class Extrinsics:
 
     def pose(self, sensor: int) -> Pose:
         """The pose of a sensor as it is believed now."""
-        x, y, heading = (self._given[sensor] + self.corrections[sensor]).tolist()
+        x, y, heading = (self._given[sensor] + self.corrections[sensor, :3]).tolist()
         return x, y, heading
 
+    def scale(self, sensor: int) -> float:
+        """What it measures, as was known before, times this is how far it is, as it is believed now."""
+        return 1.0 + float(self.corrections[sensor, 3])
+
     def _compare(self, one: int, here: tuple[float, float, float], two: int, there: tuple[float, float, float]) -> None:
-        """The same foot seen by two sensors: each is held against the other as that one is believed now."""
-        for sensor, mine, yours in ((one, here, there), (two, there, here)):
-            if sensor == 0:
-                continue
-            gap = np.array([yours[1] - mine[1], yours[2] - mine[2]])
-            if float(np.hypot(*gap)) > _NEAR_M:
-                continue
-            x, y = mine[1] - self._given[sensor][0], mine[2] - self._given[sensor][1]
-            jacobian = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]])
-            weight = _SHARE / _SIGHT_M**2
-            # Against the given pose, not against what it has been corrected to.
-            gap = gap + jacobian @ self.corrections[sensor]
-            self._information[sensor] += weight * jacobian.T @ jacobian
-            self._evidence[sensor] += weight * jacobian.T @ gap
+        """The same foot seen by two sensors, each as it is believed now."""
+        gap = np.array([there[1] - here[1], there[2] - here[2]])
+        if float(np.hypot(*gap)) > _NEAR_M:
+            return
+        jacobian = np.zeros((2, self._evidence.size))
+        for sensor, sight, sign in ((one, here, 1.0), (two, there, -1.0)):
+            x, y = sight[1] - self.pose(sensor)[0], sight[2] - self.pose(sensor)[1]
+            jacobian[:, 4 * sensor : 4 * sensor + 4] = sign * np.array([[1.0, 0.0, -y, x], [0.0, 1.0, x, y]])
+        weight = _SHARE / _SIGHT_M**2
+        self._information += weight * jacobian.T @ jacobian
+        # Against what is given, not against what it has been corrected to.
+        self._evidence += weight * jacobian.T @ (gap + jacobian @ self.corrections.ravel())
 
     def _revise(self) -> bool:
-        changed = False
-        for sensor in range(1, len(self._given)):
-            if not self._information[sensor].any():
-                continue
-            solution = np.linalg.solve(self._information[sensor] + self._prior, self._evidence[sensor])
-            if float(np.abs(solution - self.corrections[sensor]).max()) > 5e-4:
-                self.corrections[sensor] = solution
-                changed = True
-            self._information[sensor] *= _FADE
-            self._evidence[sensor] *= _FADE
-        return changed
+        if not self._information.any():
+            return False
+        solution = np.zeros_like(self._evidence)
+        free = slice(3, None)
+        solution[free] = np.linalg.solve((self._information + self._prior)[free, free], self._evidence[free])
+        self._information *= _FADE
+        self._evidence *= _FADE
+        if float(np.abs(solution - self.corrections.ravel()).max()) < _LEAST:
+            return False
+        self.corrections = solution.reshape(-1, 4)
+        return True
 
     # --- across restarts
 

@@ -54,6 +54,8 @@ class View:
         self.last: float | None = None
         #: What it measures times this is how far it is; nothing until that is known.
         self.range_scale = sensor.range_scale
+        #: And times this, as other sensors tell.
+        self.refined = 1.0
         self.ways = views(sensor.pose, mirrors)
         self.move(sensor.pose)
 
@@ -62,10 +64,21 @@ class View:
         self.pose = np.array(pose, dtype=float)
         self.rays = rays(self.sensor, pose, self.mirrors)
 
+    def refine(self, scale: float) -> None:
+        """Other sensors tell that everything is ``scale`` times as far as this one alone would know."""
+        ratio, self.refined = scale / self.refined, scale
+        self.background.stretch(ratio)
+        self.ranges *= ratio
+
+    @property
+    def scale(self) -> float:
+        """What it measures times this is how far it is, as far as is known now."""
+        return (self.range_scale or 1.0) * self.refined
+
     def take(self, ranges: Array) -> None:
         """Take in a scan (n,) m."""
         least = max(self.sensor.sweep.range_min_m, 0.02)
-        _clean(np.asarray(ranges, dtype=np.float64), least, self._reach_m, self.range_scale or 1.0, self.ranges)
+        _clean(np.asarray(ranges, dtype=np.float64), least, self._reach_m, self.scale, self.ranges)
 
     def compare(self, outline: Polygon | None) -> None:
         """Hold what the sensor measures against the walls of the room, if they are known, as soon as it sees them."""
@@ -80,7 +93,8 @@ class View:
         """JSON values."""
         arrays, numbers = self.background.save()
         packed = {name: pack(array) for name, array in arrays.items()}
-        own = {"pose": self.pose.tolist(), "last": self.last, "range_scale": self.range_scale}
+        own = {"pose": self.pose.tolist(), "last": self.last}
+        own |= {"range_scale": self.range_scale, "refined": self.refined}
         return {"background": packed, **numbers, **own}
 
     def restore(self, saved: Any) -> None:
@@ -92,7 +106,7 @@ class View:
         scale = None if saved["range_scale"] is None else float(saved["range_scale"])
         if self.sensor.range_scale is not None and self.sensor.range_scale != scale:
             raise ValueError("the saved background is of a sensor that measured otherwise")
-        self.range_scale = scale
+        self.range_scale, self.refined = scale, float(saved["refined"])
         self.move(tuple(saved["pose"]))
 
     @property
@@ -105,7 +119,7 @@ class View:
     def reach(self) -> tuple[Array, float, Array, Array]:
         """What `sight.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
         farthest = np.minimum(self.background.longest, self.rays[:, 8])
-        far = self._reach_m * (self.range_scale or 1.0)
+        far = self._reach_m * self.scale
         return farthest, far, np.asarray(self.sensor.sweep.angles, dtype=float), self.pose
 
     @property
