@@ -91,6 +91,13 @@ class Floor:
         """Everything that has a label now."""
         return [] if self.estimator is None else self.estimator.labels()
 
+    def believed(self, laser: str) -> tuple[Pose, float]:
+        """Where the laser stands, and what it measures times this is how far it is, as far as is known now."""
+        one = self.lasers[laser]
+        if self.estimator is None or laser not in self._sensors:
+            return one.pose, one.section.range_scale or 1.0
+        return self.estimator.poses()[laser], self.estimator.range_scales()[laser]
+
     def inventory(self) -> Inventory:
         now = self._clocks.now()
         labels = self.labels.inventory(self.seen(), now)

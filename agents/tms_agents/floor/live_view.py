@@ -89,9 +89,13 @@ class LiveView:
             walls = self._walls[name]
             with np.errstate(invalid="ignore"):
                 front = np.isfinite(laser.ranges) & (laser.ranges < walls - _BEFORE_M)
+            (x, y, theta), scale = self._floor.believed(name)
+            angles, at = laser.sweep.angles + theta, (x, y)
+            steady = np.isfinite(walls) & (self._echoes[name] > 0.5)
             lasers[name] = {
-                "walls": _points(laser, walls, np.isfinite(walls) & (self._echoes[name] > 0.5)),
-                "front": _points(laser, laser.ranges, front),
+                "pose": [x, y, theta],
+                "walls": _points(at, angles[steady], scale * walls[steady]),
+                "front": _points(at, angles[front], scale * laser.ranges[front]),
             }
         now = self._clocks.now()
         known, movers = self._floor.labels, self._floor.labels.movers
@@ -118,11 +122,9 @@ class LiveView:
         return {"lasers": lasers, "labels": labels}
 
 
-def _points(laser: Laser, ranges: Array, which: Any) -> list[list[float]]:
-    """Where beams end, in the room."""
-    assert laser.sweep is not None
-    x, y, theta = laser.pose
-    every = max(1, int(np.ceil(np.count_nonzero(which) / _MOST_POINTS)))
-    angles, far = laser.sweep.angles[which][::every] + theta, ranges[which][::every]
-    points = np.stack([x + far * np.cos(angles), y + far * np.sin(angles)], axis=1)
+def _points(at: tuple[float, float], angles: Array, ranges: Array) -> list[list[float]]:
+    """Where beams (n,) that start ``at`` x, y (m) end, in the room."""
+    every = max(1, int(np.ceil(angles.size / _MOST_POINTS)))
+    angles, ranges = angles[::every], ranges[::every]
+    points = np.stack([at[0] + ranges * np.cos(angles), at[1] + ranges * np.sin(angles)], axis=1)
     return [[round(float(a), 2), round(float(b), 2)] for a, b in points]

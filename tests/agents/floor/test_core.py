@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from floor_rig import COMES, DOORS, GONE, PUT_AT, QUICK, Room, config_toml, laser_toml, story, sweep
+from floor_rig import COMES, DEPTH, DOORS, GONE, PUT_AT, QUICK, WIDTH, Room, config_toml, laser_toml, story, sweep
 
 from tms_agents.clocks import Clocks
 from tms_agents.config import read_config
@@ -19,6 +19,7 @@ from tms_agents.devices.scans import Scan
 from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.core import Floor
+from tms_agents.floor.live_view import LiveView
 from tms_schemas.observation import Inventory, LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft
 
 SOUTH, WEST = (2.5, 0.05, math.pi / 2), (0.05, 2.4, 0.0)
@@ -35,10 +36,10 @@ class Bench:
         path = folder / "floor.toml"
         path.write_text(config_toml("lab", "http://127.0.0.1:1", text, more=QUICK + DOORS))
         self.now, self.poses, self.room = start, poses, Room()
-        clocks = Clocks(lambda: self.now, lambda: self.now, after=(saved or {}).get("t", -math.inf))
+        self.clocks = Clocks(lambda: self.now, lambda: self.now, after=(saved or {}).get("t", -math.inf))
         numbers = itertools.count(50 if saved else 1)
         config = read_config(path, FloorConfig)
-        self.floor = Floor(config, {}, clocks, lambda: f"lab-floor/{next(numbers)}", saved)
+        self.floor = Floor(config, {}, self.clocks, lambda: f"lab-floor/{next(numbers)}", saved)
         self.sweeps = dict.fromkeys(poses, SWEEP)
         for name in poses:
             self.floor.line(name, DeviceState("connected", "test"))
@@ -82,6 +83,25 @@ def test_a_laser_that_does_not_come_is_not_waited_for_and_comes_later(tmp_path):
     found = bench.run(4.0)  # both: the floor is learnt anew, and that is told
     assert isinstance(found[0], Inventory) and found[0].labels == []
     assert kinds(found[1:]) == [], "what lay there is background for the new one"
+
+
+def test_the_live_picture_shows_walls_where_they_are_though_the_laser_errs(tmp_path):
+    bench = Bench(tmp_path, {"south": SOUTH}, south="range_scale = 0.96")
+    view = LiveView(bench.floor, bench.clocks, lambda: bench.now)
+
+    def scan(name):
+        made = bench.room.scan(SWEEP, SOUTH, bench.now - 0.04)
+        return replace(made, ranges=made.ranges / 0.96)
+
+    def look(t):
+        view.now()
+        view.refresh()
+
+    bench.run(4.0, look, scan=scan)
+    walls = np.array(view.now()["lasers"][0]["walls"])
+    assert len(walls) > 300
+    off = np.minimum.reduce([abs(walls[:, 0]), abs(walls[:, 0] - WIDTH), abs(walls[:, 1] - DEPTH), abs(walls[:, 1])])
+    assert np.median(off) < 0.02 and off.max() < 0.05
 
 
 def test_upside_down(tmp_path):
