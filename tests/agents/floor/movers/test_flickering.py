@@ -12,12 +12,14 @@ from floor_rooms import box, cast, sweep, walker
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
 from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import Vanished
-from tms_agents.floor.movers.flickering import Flickering
+from tms_agents.floor.feet.bodies import begin, update
+from tms_agents.floor.movers.flickering import Flickering, note_stay
 from tms_agents.floor.movers.tracks import Tracks
 from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND, Background
+from tms_agents.floor.scan.clustered import BLANK
 from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.settings import Scene
-from tms_agents.floor.state import BODY, empty
+from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0
 #: A laser at the origin that looks along x and sees walls 8 m away.
@@ -229,3 +231,19 @@ def test_who_is_told_at_it_and_was_never_known_vanishes() -> None:
     body["seen"] = body["a_seen"] = body["b_seen"] = NOW + 1.1
     events = one.review(NOW + 1.1, 0.1, OPEN, lambda: 9, lambda _: False, lambda _: False, learned=True, legs=True)
     assert [(type(event), event.label) for event in events] == [(Vanished, 1)]
+
+
+@pytest.mark.parametrize(
+    ("width", "cut", "thin"), [(0.03, 0, True), (0.03, 2, False), (0.1, 0, False), (0.1, 2, False)]
+)
+def test_who_is_half_hidden_behind_somebody_is_not_thin(width: float, cut: int, thin: bool) -> None:
+    body, prints, foot = empty(BODY, 1)[0], empty(PRINT, 1), np.zeros(1, CLUSTER)
+    foot["x"], foot["width"], foot["n"], foot["spacing"], foot["cut"], foot["near"] = 4.0, width, 3, 0.015, cut, 4.0
+    begin(body, foot[0], 0, NOW)
+    for scan in range(1, 51):
+        t = NOW + 0.1 * scan
+        update(body, foot[0], True, 0, 0.0, BLANK[0], False, -1, 0.0, False, prints, t)
+        note_stay(body, 0.1, True)
+    assert body["stay"] == pytest.approx(5.0)
+    assert (body["stay_thin"] > 4.5) == thin
+    assert thin or body["stay_thin"] == 0.0
