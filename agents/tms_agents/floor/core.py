@@ -56,6 +56,8 @@ class Floor:
         self._first_at: float | None = None
         self._rest_at = -np.inf
         self._anew = False
+        #: Lasers that are known to stand elsewhere than is given.
+        self._placed: set[str] = set()
         #: What happened of late, for people: time of day and one line.
         self.story: deque[tuple[datetime, str]] = deque(maxlen=_STORY)
         #: Called with every scan that came (laser, time, scan), for recordings.
@@ -77,6 +79,7 @@ class Floor:
                 if t - self._rest_at >= _REST_S:
                     self._rest_at = t
                     found += self.labels.rest(t)
+                    self._tell_places()
         return found
 
     def line(self, laser: str, state: DeviceState) -> None:
@@ -125,6 +128,16 @@ class Floor:
             if (text := told(event)) is not None:
                 self.story.append((datetime.fromtimestamp(event.t + shift, UTC), text))
         return found
+
+    def _tell_places(self) -> None:
+        """Say once of each laser that it stands elsewhere than is given, or measures otherwise."""
+        for name in sorted(self._sensors.keys() - self._placed):
+            (x, y, theta), scale = self.believed(name)
+            given = self.lasers[name]
+            if (x, y, theta) != given.pose or scale != (given.section.range_scale or 1.0):
+                self._placed.add(name)
+                where = f"it stands at x = {x:.3f}, y = {y:.3f}, theta = {theta:.4f}"
+                log.info("laser %s: as the room tells, %s and measures %+.1f %%", name, where, 100 * (1 / scale - 1))
 
     def _knows(self, laser: str, t: float, sweep: Sweep) -> bool:
         """Whether the estimator knows this laser; it begins when all have told how they sweep, or the first waited."""

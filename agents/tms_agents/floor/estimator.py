@@ -78,7 +78,7 @@ class FloorEstimator:
         self._furniture = Furniture()
         self._footprints = Footprints(self._scene.robots, self._gates, self._association)
         self._robots = sizes(self._scene.robots)
-        told = [bool(self._scene.region) or sensor.range_scale is not None for sensor in sensors.values()]
+        told = [sensor.range_scale is not None for sensor in sensors.values()]
         self._extrinsics = Extrinsics([sensor.pose for sensor in sensors.values()], told)
         self._looks = np.zeros(_THINGS, LOOK)
         self._of = np.zeros(256, np.int64)
@@ -108,8 +108,8 @@ class FloorEstimator:
         view.claimed[:] = False
         events: list[FloorEvent] = []
         if background.ready:
-            if view.range_scale is None:
-                view.compare(self._scene.region)
+            if view.range_scale is None and (fit := view.compare(self._scene.region)) is not None:
+                self._extrinsics.place(view.index, fit.pose)
             events = self._understand(view, states, t, dt, _lights(intensities, view.n))
         background.learn(view.ranges, view.claimed, dt)
         self._outlook.look(list(self._views.values()), t, dt)
@@ -120,7 +120,7 @@ class FloorEstimator:
         return sorted(self._tracks.labels(self._t) + self._objects.labels(), key=lambda label: label.id)
 
     def poses(self) -> dict[str, Pose]:
-        """Where the sensors are: as given, refined by what several of them have seen of the same walkers."""
+        """Where the sensors are: as given, or as the walls tell, refined by what several of them have seen at once."""
         return {name: self._extrinsics.pose(view.index) for name, view in self._views.items()}
 
     def range_scales(self) -> dict[str, float]:

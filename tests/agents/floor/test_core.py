@@ -6,18 +6,33 @@ import itertools
 import json
 import logging
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from floor_rig import COMES, DEPTH, DOORS, GONE, PUT_AT, QUICK, WIDTH, Room, config_toml, laser_toml, story, sweep
+from floor_rig import (
+    COMES,
+    DEPTH,
+    DOORS,
+    GONE,
+    OUTLINE,
+    PUT_AT,
+    QUICK,
+    WIDTH,
+    Room,
+    config_toml,
+    laser_toml,
+    story,
+    sweep,
+)
 
 from tms_agents.clocks import Clocks
 from tms_agents.config import read_config
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.transport import DeviceState
-from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.config import FloorConfig, SceneSection
 from tms_agents.floor.core import Floor
 from tms_agents.floor.live_view import LiveView
 from tms_schemas.observation import Inventory, LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft
@@ -102,6 +117,21 @@ def test_the_live_picture_shows_walls_where_they_are_though_the_laser_errs(tmp_p
     assert len(walls) > 300
     off = np.minimum.reduce([abs(walls[:, 0]), abs(walls[:, 0] - WIDTH), abs(walls[:, 1] - DEPTH), abs(walls[:, 1])])
     assert np.median(off) < 0.02 and off.max() < 0.05
+
+
+def test_it_is_said_once_that_a_laser_stands_elsewhere_than_is_given(tmp_path, caplog):
+    caplog.set_level(logging.INFO)
+    bench = Bench(tmp_path, {"south": SOUTH})
+    told = bench.floor.config.model_copy(update={"scene": SceneSection(region=[*OUTLINE])})
+    x, y, theta = SOUTH
+    floor = Floor(told, {"south": (x + 0.03, y + 0.02, theta - 0.01)}, bench.clocks, lambda: "lab-floor/1")
+    for _ in range(60):
+        bench.now += 0.1
+        floor.scans("south", bench.now, [bench.room.scan(SWEEP, SOUTH, bench.now - 0.04)])
+    (line,) = [record.getMessage() for record in caplog.records if "as the room tells" in record.getMessage()]
+    assert "laser south" in line
+    numbers = [float(number) for number in re.findall(r"= (-?[0-9.]+)", line)]
+    assert numbers == pytest.approx(SOUTH, abs=0.01)
 
 
 def test_upside_down(tmp_path):

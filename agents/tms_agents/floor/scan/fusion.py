@@ -13,10 +13,12 @@ from tms_agents.floor.settings import Pose
 
 Array = NDArray[np.float64]
 
-#: Poses are given about so well (m, rad); one sighting is so good (m), and sightings of one foot resemble each other.
-_PLACE_M, _TURN_RAD, _SIGHT_M, _SHARE = 0.03, 0.012, 0.03, 0.15
-#: A ruler errs by so much, of which nothing is known, and where walls or a calibration have told.
-_RULER, _TOLD = 0.008, 0.0005
+#: Poses are given about so well (m, m, rad), and a ruler errs by so much of which nothing is known.
+_GIVEN = (0.03, 0.03, 0.012, 0.008)
+#: The same where walls have told; and how well the scale is known that was told.
+_AT_WALLS, _TOLD = (0.005, 0.005, 0.002, 0.0005), 0.0005
+#: One sighting is so good (m), and sightings of one foot resemble each other.
+_SIGHT_M, _SHARE = 0.03, 0.15
 #: Sightings of one place belong together within this time (s) and distance (m).
 _SOON_S, _NEAR_M = 0.25, 0.15
 #: The poses are revised this often (s), if they change by so much (m, rad, share); old sightings fade by this factor
@@ -33,14 +35,18 @@ class Extrinsics:
     def __init__(self, poses: Sequence[Pose], told: Sequence[bool]) -> None:
         self._given = np.array(poses, dtype=float)
         count = len(poses)
-        sd = np.ravel([(_PLACE_M, _PLACE_M, _TURN_RAD, _TOLD if known else _RULER) for known in told])
-        self._prior = np.diag(sd**-2)
+        #: How well the pose and the scale of each are known without the others (standard deviations).
+        self._known = np.array([(*_GIVEN[:3], _TOLD if known else _GIVEN[3]) for known in told])
         self._information = np.zeros((4 * count, 4 * count))
         self._evidence = np.zeros(4 * count)
         #: Of each sensor: x, y (m), heading (rad), and by which share it measures too little.
         self.corrections = np.zeros((count, 4))
         self._sights: dict[int, dict[int, tuple[float, float, float]]] = {}
         self._revised = -math.inf
+
+    def place(self, sensor: int, pose: Pose) -> None:
+        """Walls have told where the sensor is, and how it measures."""
+        self._given[sensor], self._known[sensor] = pose, _AT_WALLS
 
     def see(self, sensor: int, clusters: Any, of: NDArray[np.int64], prints: Any, t: float) -> bool:
         """Take in the clusters (m,) of a scan of ``sensor`` and their prints; whether the poses have been revised."""
@@ -89,7 +95,8 @@ class Extrinsics:
             return False
         solution = np.zeros_like(self._evidence)
         free = slice(3, None)
-        solution[free] = np.linalg.solve((self._information + self._prior)[free, free], self._evidence[free])
+        information = self._information + np.diag(self._known.ravel() ** -2)
+        solution[free] = np.linalg.solve(information[free, free], self._evidence[free])
         self._information *= _FADE
         self._evidence *= _FADE
         if float(np.abs(solution - self.corrections.ravel()).max()) < _LEAST:
@@ -102,6 +109,8 @@ class Extrinsics:
     def save(self) -> dict[str, Any]:
         """What to keep, as JSON values."""
         return {
+            "given": self._given.tolist(),
+            "known": self._known.tolist(),
             "information": self._information.tolist(),
             "evidence": self._evidence.tolist(),
             "corrections": self.corrections.tolist(),
@@ -111,6 +120,7 @@ class Extrinsics:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from what was kept."""
+        self._given, self._known = np.array(state["given"], dtype=float), np.array(state["known"], dtype=float)
         self._information = np.array(state["information"], dtype=float)
         self._evidence = np.array(state["evidence"], dtype=float)
         self.corrections = np.array(state["corrections"], dtype=float)

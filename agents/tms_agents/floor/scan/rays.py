@@ -37,7 +37,7 @@ def rays(sensor: Sensor, pose: Pose, mirrors: Sequence[tuple[Point, Point]]) -> 
     return out
 
 
-def views(pose: Pose, mirrors: Sequence[tuple[Point, Point]]) -> Array:
+def views(mirrors: Sequence[tuple[Point, Point]]) -> Array:
     """The ways in which a sensor sees a point: rows (m, 6) of the reflection (matrix, offset) to apply to it first."""
     direct = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
     rows = [direct]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.scan.background import Background
 from tms_agents.floor.scan.rays import rays, views
 from tms_agents.floor.scan.segmentation import Segmenter
-from tms_agents.floor.scan.walls import range_scale
+from tms_agents.floor.scan.walls import Fit, held_against
 from tms_agents.floor.settings import FloorSettings, Point, Polygon, Pose, Sensor
 from tms_agents.floor.state import pack, unpack
 
@@ -56,7 +56,7 @@ class View:
         self.range_scale = sensor.range_scale
         #: And times this, as other sensors tell.
         self.refined = 1.0
-        self.ways = views(sensor.pose, mirrors)
+        self.ways = views(mirrors)
         self.move(sensor.pose)
 
     def move(self, pose: Pose) -> None:
@@ -80,14 +80,18 @@ class View:
         least = max(self.sensor.sweep.range_min_m, 0.02)
         _clean(np.asarray(ranges, dtype=np.float64), least, self._reach_m, self.scale, self.ranges)
 
-    def compare(self, outline: Polygon | None) -> None:
-        """Hold what the sensor measures against the walls of the room, if they are known, as soon as it sees them."""
-        self.range_scale = 1.0
+    def compare(self, outline: Polygon | None) -> Fit | None:
+        """Hold what the sensor sees against the walls of the room, if they are known: where it is, if they tell."""
+        self.range_scale, fit = 1.0, None
         if outline is not None:
             points = self.background.points(np.asarray(self.sensor.sweep.angles, dtype=float))
-            self.range_scale = range_scale(points, outline, self.sensor.pose)
-            self.background.stretch(self.range_scale)
-            self.ranges *= self.range_scale
+            fit = held_against(points, outline, self.sensor.pose)
+        if fit is not None:
+            self.range_scale = fit.range_scale
+            self.background.stretch(fit.range_scale)
+            self.ranges *= fit.range_scale
+            self.move(fit.pose)
+        return fit
 
     def save(self) -> dict[str, Any]:
         """JSON values."""

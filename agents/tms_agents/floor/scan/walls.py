@@ -31,9 +31,9 @@ _NOWHERE = "what the laser sees does not fit the outline of the room anywhere ne
 #: Nothing is known of a ruler but that it errs by so much (standard deviation), and by how much at most; a point is so
 #: good (m).
 _RULER, _MOST, _POINT_M = 0.01, 0.02, 0.005
-#: A ruler is believed that is known so well, from this share of the points at a wall, the laser so near (m) where it is
-#: said to be.
-_SURE, _AT_WALLS, _MOVED_M = 0.002, 0.3, 0.15
+#: A ruler is believed that is known so well, from this share of the points at a wall, the laser so near (m, rad) where
+#: it is said to be.
+_SURE, _AT_WALLS, _MOVED_M, _TURNED = 0.002, 0.3, 0.15, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +79,16 @@ def fit_walls(points: Array, outline: Sequence[tuple[float, float]], start: Pose
     return _judged(points, walls, best)
 
 
-def range_scale(points: Array, outline: Sequence[tuple[float, float]], pose: Pose) -> float:
-    """What a laser at about this ``pose`` measures times this is how far it is; 1 where the walls do not tell."""
+def held_against(points: Array, outline: Sequence[tuple[float, float]], pose: Pose) -> Fit | None:
+    """Where a laser at about this ``pose`` stands, and how its ruler errs; None where the walls do not tell both."""
     try:
         _require(points)
         walls = _Walls(outline)
         fit = _judged(points, walls, _settled(_spaced(points), walls, pose, _REACH_M[2:]))
     except ValueError:
-        return 1.0
-    here = math.dist(fit.pose[:2], pose[:2]) < _MOVED_M
-    return (fit.known_scale or 1.0) if here else 1.0
+        return None
+    here = math.dist(fit.pose[:2], pose[:2]) < _MOVED_M and _turn(fit.pose[2], pose[2]) < _TURNED
+    return fit if here and fit.known_scale is not None else None
 
 
 def _require(points: Array) -> None:

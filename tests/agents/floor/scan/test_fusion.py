@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from floor_rooms import WALLS, Room, box, sweep, thing, together, walker
 
 from tms_agents.floor import Appeared, FloorEstimator, Scene, Sensor
 from tms_agents.floor.scan.rays import rays, reflection
 
 TRUE = {"A": (0.05, 0.05, math.pi / 4), "B": (4.95, 3.95, -3 * math.pi / 4)}
+#: Walls on both sides of it.
+WIDE = sweep(541, 1.5 * math.pi)
 WAY = [(9.0, 4.8, 1.0), (14.0, 1.0, 1.0), (19.0, 1.0, 3.0), (24.0, 4.0, 3.0), (29.0, 4.0, 1.2), (34.0, 1.5, 2.0)]
 
 
@@ -25,6 +28,39 @@ def test_a_pose_that_is_a_little_wrong_is_corrected_by_common_walkers() -> None:
     assert estimator.poses()["A"] == TRUE["A"]
     assert np.hypot(*after) < 0.5 * np.hypot(*before)
     assert abs(estimator.poses()["B"][2] - heading) < 0.008
+
+
+@pytest.mark.parametrize("longer", [0.99, 1.01])
+def test_two_lasers_tell_each_other_how_their_rulers_err(longer: float) -> None:
+    """One measures everything too long or too short, the other one right; no walls are known."""
+    room = Room(walker(WAY), sensors={name: Sensor(sweep(), pose) for name, pose in TRUE.items()})
+    estimator = FloorEstimator(room.sensors)
+    for name, t, ranges in room.scans(34.0):
+        estimator.scan(name, t, ranges * (longer if name == "B" else 1.0))
+    scales = estimator.range_scales()
+    assert abs(scales["B"] * longer - 1.0) < 0.006
+    assert abs(scales["A"] - 1.0) < 0.006
+    again = FloorEstimator.from_dict(estimator.to_dict(), room.sensors)
+    assert again.range_scales() == scales and again.poses() == estimator.poses()
+
+
+def test_a_scale_that_is_told_is_not_learned_from_another_laser() -> None:
+    room = Room(walker(WAY), sensors={name: Sensor(sweep(), pose, 1.0) for name, pose in TRUE.items()})
+    estimator = FloorEstimator(room.sensors)
+    for name, t, ranges in room.scans(34.0):
+        estimator.scan(name, t, ranges * (1.01 if name == "B" else 1.0))
+    assert estimator.range_scales() == pytest.approx({"A": 1.0, "B": 1.0}, abs=0.001)
+
+
+def test_walls_tell_where_a_laser_stands_and_its_restart_knows() -> None:
+    room = Room(walker(WAY), sensors={name: Sensor(WIDE, pose) for name, pose in TRUE.items()})
+    believed = {name: Sensor(WIDE, (x + 0.04, y - 0.03, heading + 0.02)) for name, (x, y, heading) in TRUE.items()}
+    scene = Scene(region=[(0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0)])
+    estimator, _ = room.play(34.0, FloorEstimator(believed, scene=scene))
+    for name, pose in TRUE.items():
+        assert estimator.poses()[name] == pytest.approx(pose, abs=0.008)
+    again = FloorEstimator.from_dict(estimator.to_dict(), believed, scene=scene)
+    assert again.poses() == estimator.poses()
 
 
 def test_beams_go_on_behind_a_mirror() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tms_agents.floor import FloorEstimator, Scene, Sensor
-from tms_agents.floor.scan.walls import range_scale
+from tms_agents.floor.scan.walls import held_against
 
 OUTLINE = ((0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0))
 WIDE = sweep(541, 1.5 * math.pi)
@@ -37,13 +37,14 @@ def points(
     longer=st.floats(0.985, 1.015),
     off=st.tuples(st.floats(-0.03, 0.03), st.floats(-0.03, 0.03), st.floats(-0.01, 0.01)),
 )
-def test_the_walls_tell_how_a_ruler_errs_also_where_the_pose_is_a_little_wrong(
-    longer: float, off: tuple[float, float, float]
-) -> None:
+def test_the_walls_tell_how_a_ruler_errs_and_where_the_laser_is(longer: float, off: tuple[float, float, float]) -> None:
     pose = (0.05, 0.05, math.pi / 4)
     seen = points(pose, longer, [(2.0, 3.6, 0.3), (4.0, 1.0, 0.2)])
     believed = (pose[0] + off[0], pose[1] + off[1], pose[2] + off[2])
-    assert range_scale(seen, OUTLINE, believed) == pytest.approx(1.0 / longer, abs=0.001)
+    fit = held_against(seen, OUTLINE, believed)
+    assert fit is not None
+    assert fit.range_scale == pytest.approx(1.0 / longer, abs=0.001)
+    assert fit.pose == pytest.approx(pose, abs=0.004)
 
 
 @pytest.mark.parametrize(
@@ -56,13 +57,13 @@ def test_the_walls_tell_how_a_ruler_errs_also_where_the_pose_is_a_little_wrong(
     ids=["another room", "hardly a wall", "no room"],
 )
 def test_walls_that_are_not_there_tell_nothing(outline: Sequence[tuple[float, float]]) -> None:
-    assert range_scale(points((0.05, 0.05, math.pi / 4), 1.01), outline, (0.05, 0.05, math.pi / 4)) == 1.0
+    assert held_against(points((0.05, 0.05, math.pi / 4), 1.01), outline, (0.05, 0.05, math.pi / 4)) is None
 
 
 def test_who_sees_walls_on_one_side_of_it_may_stand_elsewhere_instead() -> None:
     seen = points((2.5, 2.0, 0.0), 1.01)
     ahead = seen[(seen[:, 0] > 0.0) & (seen[:, 1] > 0.0)]
-    assert range_scale(ahead, OUTLINE, (2.5, 2.0, 0.0)) == pytest.approx(1.0, abs=1e-3)
+    assert held_against(ahead, OUTLINE, (2.5, 2.0, 0.0)) is None
 
 
 def test_a_scale_that_is_told_counts_whatever_the_walls_are_and_nothing_learned_with_another_one() -> None:
