@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: A point that fits a wall is this near to it.
 MATCHED_M = 0.03
+#: Fewer points, or a smaller share of those at walls, are at a wall by chance.
+_FEW, _STRAY = 5, 0.03
 #: Between the first look and the last, what counts as near a wall shrinks so.
 _REACH_M = (0.6, 0.3, 0.15, 0.08, 0.05)
 _TURNS_PER_REACH = 5
@@ -97,8 +100,9 @@ def _require(points: Array) -> None:
 
 
 def _judged(points: Array, walls: _Walls, best: NDArray[np.float64]) -> Fit:
-    gap, jacobian = _residuals(points, walls, best)
-    near = np.abs(gap) < MATCHED_M
+    residuals = _residuals(points, walls, best)
+    gap, jacobian, _ = residuals
+    near = residuals.matched
     if near.sum() < 20:
         raise ValueError(_NOWHERE)
     rmse = float(np.sqrt(np.mean(gap[near] ** 2)))
@@ -139,8 +143,8 @@ class _Walls:
         self.length, self.along = length, along / length[:, None]
         self.normal = np.stack([-self.along[:, 1], self.along[:, 0]], axis=1)
 
-    def nearest(self, points: Array) -> tuple[Array, Array]:
-        """Signed distance (n,) to the nearest side, and that side's normal (n, 2)."""
+    def nearest(self, points: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Signed distance (n,) to the nearest side, and which that is (n,)."""
         offset = points[:, None, :] - self.start[None]
         along = np.einsum("nsk,sk->ns", offset, self.along)
         across = np.einsum("nsk,sk->ns", offset, self.normal)
@@ -149,24 +153,40 @@ class _Walls:
         rows = np.arange(len(points))
         # Beyond a side's end a point is as far away as that end.
         gap = np.where(beyond[rows, side] == 0.0, across[rows, side], np.inf)
-        return gap, self.normal[side]
+        return gap, side
 
 
-def _residuals(points: Array, walls: _Walls, found: NDArray[np.float64]) -> tuple[Array, Array]:
-    """Distances (n,) to the walls, inf for what is at none, and their derivatives (n, 4) by pose and scale."""
+class _Residuals(NamedTuple):
+    """Distances (n,) m to the walls, inf at none, their derivatives (n, 4) by pose and scale; which wall."""
+
+    gap: Array
+    jacobian: Array
+    side: NDArray[np.intp]
+
+    @property
+    def matched(self) -> NDArray[np.bool_]:
+        """Which points are at a wall (n,) at which are others: in a corner some seem to be at the next one."""
+        near: NDArray[np.bool_] = np.abs(self.gap) < MATCHED_M
+        crowd = np.bincount(self.side[near], minlength=int(self.side.max()) + 1)
+        crowded: NDArray[np.bool_] = crowd[self.side] >= max(_FEW, _STRAY * near.sum())
+        return near & crowded
+
+
+def _residuals(points: Array, walls: _Walls, found: NDArray[np.float64]) -> _Residuals:
     cos, sin = np.cos(found[2]), np.sin(found[2])
     turned = points @ np.array([[cos, sin], [-sin, cos]])
-    gap, normal = walls.nearest(found[3] * turned + found[:2])
+    gap, side = walls.nearest(found[3] * turned + found[:2])
+    normal = walls.normal[side]
     by_angle = found[3] * (normal[:, 1] * turned[:, 0] - normal[:, 0] * turned[:, 1])
-    return gap, np.column_stack([normal, by_angle, np.sum(normal * turned, axis=1)])
+    return _Residuals(gap, np.column_stack([normal, by_angle, np.sum(normal * turned, axis=1)]), side)
 
 
 def _settled(points: Array, walls: _Walls, start: Sequence[float], reaches: Sequence[float]) -> NDArray[np.float64]:
     """Pose and scale (4,): the pose first, both where the walls tell both."""
     pose = _descend(points, walls, np.array([*start, 1.0]), reaches, 1e6)
     both = _descend(points, walls, pose, _REACH_M[2:], (_POINT_M / _RULER) ** 2)
-    gap, jacobian = _residuals(points, walls, both)
-    sure = _deviations(jacobian[np.abs(gap) < MATCHED_M], _POINT_M)[3] < _SURE
+    residuals = _residuals(points, walls, both)
+    sure = _deviations(residuals.jacobian[residuals.matched], _POINT_M)[3] < _SURE
     return both if sure and abs(both[3] - 1.0) < _MOST else pose
 
 
@@ -183,7 +203,7 @@ def _descend(
     prior = np.diag([0.0, 0.0, 0.0, ruler])
     for reach in reaches:
         for _ in range(_TURNS_PER_REACH):
-            gap, jacobian = _residuals(points, walls, found)
+            gap, jacobian, _ = _residuals(points, walls, found)
             near = np.abs(gap) < reach
             if near.sum() < 10:
                 return found
@@ -199,7 +219,7 @@ def _descend(
 
 def _fits(points: Array, walls: _Walls, found: NDArray[np.float64]) -> tuple[float, float]:
     """The share of points at a wall, in hundredths, and minus how far they are off, in whole millimetres."""
-    gap = _residuals(points, walls, found)[0]
+    gap = _residuals(points, walls, found).gap
     near = np.abs(gap) < MATCHED_M
     off = float(np.sqrt(np.mean(gap[near] ** 2))) if near.any() else MATCHED_M
     return round(float(near.mean()), 2), -round(off, 3)

@@ -51,13 +51,16 @@ def test_the_walls_tell_how_a_ruler_errs_and_where_the_laser_is(longer: float, o
     "outline",
     [
         ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0)),
+        ((0.05, 0.05), (4.95, 0.05), (4.95, 3.95), (0.05, 3.95)),
+        ((-0.08, -0.08), (5.08, -0.08), (5.08, 4.08), (-0.08, 4.08)),
         ((-9.0, 0.0), (9.0, 0.0), (9.0, 4.0)),
         ((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)),
     ],
-    ids=["another room", "hardly a wall", "no room"],
+    ids=["another room", "5 cm inside", "8 cm outside", "hardly a wall", "no room"],
 )
 def test_walls_that_are_not_there_tell_nothing(outline: Sequence[tuple[float, float]]) -> None:
-    assert held_against(points((0.05, 0.05, math.pi / 4), 1.01), outline, (0.05, 0.05, math.pi / 4)) is None
+    for pose in ((0.05, 0.05, math.pi / 4), (2.5, 0.05, math.pi / 2)):
+        assert held_against(points(pose, 1.0), outline, pose) is None
 
 
 def test_who_sees_walls_on_one_side_of_it_may_stand_elsewhere_instead() -> None:
