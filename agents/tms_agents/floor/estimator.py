@@ -225,7 +225,7 @@ class FloorEstimator:
             return []
         if back := self._tracks.turns_up(self._prints, index, t):
             return back
-        if known or self._furniture.explains(q, self._prints, self._pieces(t), t):
+        if known or self._furniture.explains(q, self._prints, self._pieces(t), t, self._empty_until(q, t)):
             q["revealed"] = MOVED
             return []
         if t - q["silent"] < _MUTE_S and self._dark_width(q) > _DARK_M:
@@ -233,11 +233,21 @@ class FloorEstimator:
             return []
         return self._objects.born(index, self._prints, self._tracks.bodies, self._new_label(), t)
 
+    def _empty_until(self, q: Any, t: float) -> float:
+        """When the place of the print was last seen to be empty; it came to rest there then, or unseen, later."""
+        view, beams = self._met(q)
+        past = view.background.seen_past(*beams, float(q["near"])) + t - view.background.seconds
+        return min(past, float(q["rested"]))
+
     def _dark_width(self, q: Any) -> float:
         """How wide (m) that is of which the sensor that has met the print last sees a part: black or glossy."""
-        view = next(view for view in self._views.values() if view.index == q["sensor"])
-        beams = int(q["first_beam"]), int(q["last_beam"])
+        view, beams = self._met(q)
         return float(dark_width(*beams, float(q["near"]), view.ranges, view.background.longest, view.step))
+
+    def _met(self, q: Any) -> tuple[View, tuple[int, int]]:
+        """The sensor that has met the print last, and from which to which beam."""
+        view = next(view for view in self._views.values() if view.index == q["sensor"])
+        return view, (int(q["first_beam"]), int(q["last_beam"]))
 
     def _protect(self, view: View, clusters: Any, of: NDArray[np.int64], somebodys: NDArray[np.bool_]) -> None:
         """What is somebody or something is not learned as background; furniture is, at once."""

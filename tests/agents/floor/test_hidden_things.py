@@ -147,11 +147,11 @@ def thin(*places: tuple[float, float], mutes: int = 0) -> np.ndarray:
 
 def test_three_legs_that_came_together_are_a_chair_and_parts_of_one_black_thing_are_not() -> None:
     chair = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4))
-    assert Furniture().explains(chair[0], chair, [], 5.0)
+    assert Furniture().explains(chair[0], chair, [], 5.0, 4.0)
     close = thin((2.0, 2.0), (2.1, 2.0), (2.0, 2.1))
-    assert not Furniture().explains(close[0], close, [], 5.0)
+    assert not Furniture().explains(close[0], close, [], 5.0, 4.0)
     black = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4), mutes=30)
-    assert not Furniture().explains(black[0], black, [], 5.0)
+    assert not Furniture().explains(black[0], black, [], 5.0, 4.0)
 
 
 @pytest.mark.parametrize(("owned", "unseen_s", "legs"), [(1.0, 2.0, False), (1.0, 0.2, True), (-1.0, 2.0, True)])
@@ -160,7 +160,7 @@ def test_feet_that_were_lifted_are_not_the_other_legs_of_a_chair(owned: float, u
     prints = thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4))
     prints["last"], prints["owned"] = 5.0, -1.0
     prints["owned"][1:], prints["last"][1:] = owned, 5.0 - unseen_s
-    assert Furniture().explains(prints[0], prints, [], 5.0) == legs
+    assert Furniture().explains(prints[0], prints, [], 5.0, 4.0) == legs
 
 
 @pytest.mark.parametrize(
@@ -171,11 +171,11 @@ def test_feet_that_were_lifted_are_not_the_other_legs_of_a_chair(owned: float, u
 def test_a_leg_that_is_believed_late_belongs_to_the_legs_known_before(rested: float, away: float, leg: bool) -> None:
     furniture, chair = Furniture(), thin((2.0, 2.0), (2.4, 2.0), (2.0, 2.4))
     chair["rested"] = 1.0
-    assert all(furniture.explains(one, chair, [], 5.0) for one in chair)
+    assert all(furniture.explains(one, chair, [], 5.0, 4.0) for one in chair)
     last = thin((2.4 + away, 2.4))
     last["rested"] = rested
-    assert furniture.explains(last[0], last, [], 20.0) == leg
-    assert not furniture.explains(last[0], last, [], 300.0)
+    assert furniture.explains(last[0], last, [], 20.0, 4.0) == leg
+    assert not furniture.explains(last[0], last, [], 300.0, 4.0)
 
 
 def dark(echoes: list[int], between: list[int], *, ranges: float = 4.0) -> float:
@@ -211,15 +211,26 @@ def test_a_thin_thing_is_no_leg_of_a_box_that_went() -> None:
         Piece(1.0, 2.9, 2.0, 0.03, 1.0),
         Piece(1.0, 2.9, 2.0, 0.3, 1.0),
     )
-    assert Furniture().explains(alone[0], alone, [leg, other], 5.0)
-    assert not Furniture().explains(alone[0], alone, [leg, side], 5.0)
+    assert Furniture().explains(alone[0], alone, [leg, other], 5.0, 4.0)
+    assert not Furniture().explains(alone[0], alone, [leg, side], 5.0, 4.0)
 
 
 @pytest.mark.parametrize(("piece", "is_it"), [(0.03, False), (0.07, True)], ids=["leg of a chair", "as wide"])
 def test_a_thing_is_no_piece_of_furniture_that_was_half_as_wide(piece: float, is_it: bool) -> None:
     put = thin((2.0, 2.0))
     put["width"], put["spacing"] = 0.076, 0.015
-    assert Furniture().explains(put[0], put, [Piece(1.0, 2.5, 2.0, piece, 1.0)], 5.0) == is_it
+    assert Furniture().explains(put[0], put, [Piece(1.0, 2.5, 2.0, piece, 1.0)], 5.0, 4.0) == is_it
+
+
+@pytest.mark.parametrize(
+    ("rested", "empty_until", "away", "is_it"),
+    [(4.0, 4.0, 0.5, True), (60.0, 60.0, 0.5, False), (60.0, 3.0, 0.5, True), (60.0, 60.0, 0.15, True)],
+    ids=["at once", "a minute later", "nobody saw when", "it comes back"],
+)
+def test_furniture_is_not_pushed_for_a_minute(rested: float, empty_until: float, away: float, is_it: bool) -> None:
+    put, gone = thin((2.5 - away, 2.0)), [Piece(1.0, 2.5, 2.0, 0.07, 1.0)]
+    put["width"], put["spacing"], put["rested"] = 0.076, 0.015, rested
+    assert Furniture().explains(put[0], put, gone, rested + 2.0, empty_until) == is_it
 
 
 @pytest.mark.parametrize(
@@ -238,7 +249,7 @@ def test_a_part_of_what_was_pushed_is_not_a_piece_of_its_own(
     box = thin((2.0, 2.0))
     box["width"] = 0.1
     gone = [Piece(1.0, 2.5, 2.0, 0.1, 1.0), Piece(went, 2.5 + away, 2.0, width, 1.0)]
-    assert Furniture().explains(box[0], box, gone, 5.0) == is_it
+    assert Furniture().explains(box[0], box, gone, 5.0, 4.0) == is_it
 
 
 @pytest.mark.parametrize(("widths", "lacks"), [((), False), ((0.02, 0.015), False), ((0.02, 0.03), True)])

@@ -25,6 +25,8 @@ _WEIGHT = 0.06
 _MOSTLY = 0.5
 #: What is silent less often than this is missed where nothing comes back.
 _SILENT = 0.7
+#: What ends so far (m) beyond something passes it.
+_BEYOND_M = 0.1
 
 
 @njit(cache=True)
@@ -355,6 +357,14 @@ class Background:
         beams = np.flatnonzero(self.weight.max(axis=1) > _MOSTLY)
         ranges = self.centre[beams, best[beams]]
         return np.stack([ranges * np.cos(angles[beams]), ranges * np.sin(angles[beams])], axis=1)
+
+    def seen_past(self, first: int, last: int, range_m: float) -> float:
+        """When (in its ``seconds``) beams from ``first`` to ``last`` ended beyond the range last; inf: none tells."""
+        beams = slice(first, last + 1)
+        beyond = (self.weight[beams] > 0.0) & (self.centre[beams] > range_m + _BEYOND_M)
+        past = np.where(beyond, self.seen_at[beams], -np.inf).max(axis=1)
+        # At the edges beams pass beside what stands there.
+        return float(np.median(np.where(beyond.any(axis=1), past, np.inf)))
 
     def stretch(self, scale: float) -> None:
         """Everything is ``scale`` times as far as it was learned."""

@@ -18,14 +18,15 @@ Leg = tuple[float, float, float]
 LOOKS, MOVED = 1, 2
 #: The weight of either in the background: what only looks like it cannot turn up elsewhere as a piece, at first.
 ADOPTED = (0.0, 0.1, 0.3)
-#: Furniture is pushed so far at most (m); it stands again so long (s) after its old place was seen free, and so long if
-#: it is one piece. Its width is then the same within this (m) and as far as the beams tell.
+#: Furniture is pushed so far at most (m); where it stands again is seen empty for so long (s) at most after its old
+#: place, and for so long if it is one piece. Its width is then the same within this (m) and as far as the beams tell.
 _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 #: A thin piece (m), like the leg of a chair, tells only together with another so near it (m) that went so soon (s).
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 #: Its width is the same within this (m) and as far as the beams tell.
 _THIN_WIDTH_M = 0.01
-#: Two pieces of one surface are so near each other (m), and one is seen to have gone so long (s) after the other.
+#: Two pieces of one surface are so near each other (m), and one is seen to have gone so long (s) after the other; what
+#: has come back stands so near where it stood.
 _BESIDE_M, _TOGETHER_GONE_S = 0.1, 15.0
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
@@ -168,19 +169,20 @@ class Furniture:
         count = _pieces(b.centre, b.weight, b.missing, b.gone_at, view.rays, abs(view.step), late, self._rows)
         return [Piece(*row) for row in self._rows[:count].tolist()]
 
-    def explains(self, print_: Any, prints: Any, pieces: list[Piece], t: float) -> bool:
+    def explains(self, print_: Any, prints: Any, pieces: list[Piece], t: float, empty_until: float) -> bool:
         """Whether the print is a piece of furniture that has gone from somewhere near; each piece explains one.
 
-        Or thin as the leg of a chair, with two more among the ``prints`` that came to stand with it.
+        Or thin as the leg of a chair, with two more among the ``prints`` that came to stand with it. ``empty_until``
+        (s): its place was last seen to be empty then.
         """
         self.legs = [leg for leg in self.legs if t - leg[0] < _LEGS_S][-64:]
-        if _legs(print_, prints, self.legs) or self._gone_from(print_, pieces, t):
+        if _legs(print_, prints, self.legs) or self._gone_from(print_, pieces, t, empty_until):
             if print_["width"] < _THIN_M:
                 self.legs.append((float(print_["rested"]), float(print_["x"]), float(print_["y"])))
             return True
         return False
 
-    def _gone_from(self, print_: Any, pieces: list[Piece], t: float) -> bool:
+    def _gone_from(self, print_: Any, pieces: list[Piece], t: float, empty_until: float) -> bool:
         """Whether the print is one of the ``pieces``."""
         self._found = [item for item in self._found if t - item[0] < 2 * _PUSHED_S][-64:]
         near = [p for p in pieces if p.whole and math.hypot(p.x - print_["x"], p.y - print_["y"]) < _PUSHED_M]
@@ -191,13 +193,16 @@ class Furniture:
             if any(math.hypot(piece.x - x, piece.y - y) < 0.05 for _, x, y in self._found):
                 continue
             thin = width < _THIN_M
-            if print_["rested"] - piece.t > (_PUSHED_S if thin else _ALONE_S) or (
-                thin and not self._grouped(piece, pieces, _THIN_M + spacing)
-            ):
+            away = math.hypot(piece.x - print_["x"], piece.y - print_["y"])
+            late = empty_until - piece.t > (_PUSHED_S if thin else _ALONE_S)
+            if late and away > 0.5 * (piece.width + width) + _BESIDE_M:
+                # It may come back to where it stood whenever it likes.
+                continue
+            if thin and not self._grouped(piece, pieces, _THIN_M + spacing):
                 continue
             least = _THIN_WIDTH_M if min(width, piece.width) < _THIN_M else _WIDTH_M
             difference = abs(piece.width - width) / (least + 0.15 * max(piece.width, width) + spacing)
-            cost = 0.3 * math.hypot(piece.x - print_["x"], piece.y - print_["y"]) / _PUSHED_M + 0.7 * difference
+            cost = 0.3 * away / _PUSHED_M + 0.7 * difference
             # What somebody put down must look just like the piece.
             if difference < (0.5 if print_["given"] == 1 else 1.0) and cost < best_cost:
                 best, best_cost = piece, cost

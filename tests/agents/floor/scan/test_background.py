@@ -81,6 +81,19 @@ def test_a_piece_has_gone_since_its_place_was_free_however_long_it_was_hidden_th
     assert piece.t == pytest.approx(500.0 - hidden_s - 2.0, abs=0.11)
 
 
+def test_it_is_known_until_when_the_place_of_something_was_empty(learned: Background) -> None:
+    came = learned.seconds
+    scan = np.full(30, 3.0)
+    for k in range(50):
+        scan[10:15] = 2.0
+        scan[14] = 3.0 if k % 2 else 2.0  # beside its edge
+        learned.classify(scan)
+        learned.learn(scan, scan == 2.0, 0.1)
+    assert learned.seen_past(10, 14, 2.0) == pytest.approx(came, abs=0.11)
+    assert learned.seen_past(10, 14, 3.0) == np.inf
+    assert learned.seen_past(20, 24, 2.0) == pytest.approx(learned.seconds)
+
+
 def test_it_follows_a_slow_drift(learned: Background) -> None:
     for k in range(60):
         learn(learned, np.full(30, 3.0 - 0.001 * k), 2.0, seed=k)
