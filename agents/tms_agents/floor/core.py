@@ -137,7 +137,8 @@ class Floor:
             if (x, y, theta) != given.pose or scale != (given.section.range_scale or 1.0):
                 self._placed.add(name)
                 where = f"it stands at x = {x:.3f}, y = {y:.3f}, theta = {theta:.4f}"
-                log.info("laser %s: as the room tells, %s and measures %+.1f %%", name, where, 100 * (1 / scale - 1))
+                longer = 100 * (1 / scale - 1)
+                log.info("laser %s: as the room tells, %s and measures %+.1f %% too long", name, where, longer)
 
     def _knows(self, laser: str, t: float, sweep: Sweep) -> bool:
         """Whether the estimator knows this laser; it begins when all have told how they sweep, or the first waited."""

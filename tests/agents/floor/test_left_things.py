@@ -9,10 +9,11 @@ import pytest
 
 from tms_agents.floor.feet.prints import follow
 from tms_agents.floor.movers.review import CONFIRM, NOTHING, Waits, review
-from tms_agents.floor.scan.background import BACKGROUND, BEYOND, FOREGROUND
+from tms_agents.floor.scan.background import BACKGROUND, BEYOND, FOREGROUND, Background
 from tms_agents.floor.scan.freespace import guard
 from tms_agents.floor.scan.furniture import Furniture
 from tms_agents.floor.scan.segmentation import CLUSTER
+from tms_agents.floor.settings import FloorSettings
 from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0
@@ -58,7 +59,8 @@ def face(between: float) -> list[tuple[float, float]]:
     centre[30:33, 0], weight[30:33, 1], missing[30:33, 1] = between, 0.0, 0.0
     rays = np.zeros((n, 10))
     rays[:, 2] = 1.0
-    background = SimpleNamespace(centre=centre, weight=weight, missing=missing)
+    background = Background(n, 0.005, FloorSettings())
+    background.centre, background.weight, background.missing = centre, weight, missing
     view = SimpleNamespace(background=background, rays=rays, step=0.005)
     return [(round(piece.width, 3), piece.whole) for piece in Furniture().pieces(view, NOW)]
 

@@ -216,9 +216,9 @@ def update(
     if both:
         body.both += 1
     width = max(c.width if has_c else 0.0, d.width if has_d else 0.0)
-    # Both feet in one are as broad as they like, and what is partly hidden behind somebody as thin.
+    # Both feet in one are as broad as they like, and what is partly hidden behind something as thin.
     broader = c if has_c and (not has_d or c.width >= d.width) else d
-    hidden = broader.cut == 2 and width < _FOOT_M
+    hidden = 0 < broader.cut < FADES and width < _FOOT_M
     body.broadest = 0.0 if hidden or (one and knows_feet(body)) else width
     body.spacing = c.spacing if has_c else d.spacing
     body.wide += 0.05 * ((1.0 if width > WIDE_M else 0.0) - body.wide)

@@ -28,6 +28,8 @@ NOTHING, CONFIRM, LOST, BACK, GONE, MOVED, BROAD, PIECE, THING, FLICKERS = 0, 1,
 _NEW_S = 30.0
 #: A person of whom one foot alone is seen, unmoved, for so long (s) is not there.
 _LONE_S = 4.0
+#: Of what flickers now this is seen, now that: not one thing alone for so long (s).
+_SINGLE_S = 5.0
 #: No leg is broader (m).
 LEG_M = 0.2
 #: What was pushed stands still for so long (s): it is furniture.
@@ -282,7 +284,8 @@ def _seen(bodies: Any, b: int, t: float, dt: float, sight: Any, legs: bool) -> i
     if (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or _is_parked(body, t, legs):
         return THING
     if flickers(body, legs):
-        return FLICKERS
+        # One thing alone does not flicker.
+        return THING if body.single > _SINGLE_S else FLICKERS
     if body.stale:
         return BACK
     if int(t) > int(t - dt) and _is_piece(body, t):

@@ -17,7 +17,7 @@ from tms_agents.floor.movers.flickering import Flickering, note_stay
 from tms_agents.floor.movers.tracks import Tracks
 from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND, Background
 from tms_agents.floor.scan.clustered import BLANK
-from tms_agents.floor.scan.segmentation import CLUSTER
+from tms_agents.floor.scan.segmentation import CLUSTER, FADES
 from tms_agents.floor.settings import Scene
 from tms_agents.floor.state import BODY, PRINT, empty
 
@@ -53,9 +53,10 @@ def stays(
     moves_m: float = 0.0,
     thin: int = 0,
     lands: int = 0,
+    feet: int = 2,
     **fields: float,
 ) -> Tracks:
-    """Somebody shows both feet for so long, in ``broad`` of ten scans as something 0.4 m broad, in ``thin`` 3 cm.
+    """Somebody shows so many ``feet`` for so long, in ``broad`` of ten scans something 0.4 m broad, in ``thin`` 3 cm.
 
     Every three seconds he is ``moves_m`` farther, and in ``lands`` of ten scans a foot has landed.
     """
@@ -81,7 +82,8 @@ def stays(
         t = NOW + 0.1 * scan
         for name in ("x", "ax", "bx"):
             body[name] += moves_m * (scan % 30 == 0)
-        body["seen"] = body["a_seen"] = body["b_seen"] = t
+        body["seen"] = body["a_seen"] = t
+        body["b_seen"], body["lone"] = t if feet == 2 else NOW - 60.0, 0.0
         body["broadest"] = 0.4 if scan % 10 < broad else 0.03 if scan % 10 >= 10 - thin else 0.1
         if scan % 10 < lands:
             body["a_since"] = t
@@ -233,10 +235,16 @@ def test_who_is_told_at_it_and_was_never_known_vanishes() -> None:
     assert [(type(event), event.label) for event in events] == [(Vanished, 1)]
 
 
+@pytest.mark.parametrize(("feet", "found"), [(2, True), (1, False)])
+def test_one_thin_thing_alone_does_not_flicker_and_is_not_learned(feet: int, found: bool) -> None:
+    assert bool(stays(0, 7.0, thin=10, feet=feet).flickering.places) == found
+
+
 @pytest.mark.parametrize(
-    ("width", "cut", "thin"), [(0.03, 0, True), (0.03, 2, False), (0.1, 0, False), (0.1, 2, False)]
+    ("width", "cut", "thin"),
+    [(0.03, 0, True), (0.03, 1, False), (0.03, 2, False), (0.03, FADES, True), (0.1, 0, False), (0.1, 2, False)],
 )
-def test_who_is_half_hidden_behind_somebody_is_not_thin(width: float, cut: int, thin: bool) -> None:
+def test_who_is_half_hidden_behind_something_is_not_thin(width: float, cut: int, thin: bool) -> None:
     body, prints, foot = empty(BODY, 1)[0], empty(PRINT, 1), np.zeros(1, CLUSTER)
     foot["x"], foot["width"], foot["n"], foot["spacing"], foot["cut"], foot["near"] = 4.0, width, 3, 0.015, cut, 4.0
     begin(body, foot[0], 0, NOW)
