@@ -224,8 +224,14 @@ def test_a_thing_is_no_piece_of_furniture_that_was_half_as_wide(piece: float, is
 
 @pytest.mark.parametrize(
     ("rested", "empty_until", "away", "is_it"),
-    [(4.0, 4.0, 0.5, True), (60.0, 60.0, 0.5, False), (60.0, 3.0, 0.5, True), (60.0, 60.0, 0.15, True)],
-    ids=["at once", "a minute later", "nobody saw when", "it comes back"],
+    [
+        (4.0, 4.0, 0.5, True),
+        (60.0, 60.0, 0.5, False),
+        (60.0, 3.0, 0.5, True),
+        (60.0, 60.0, 0.1, True),
+        (60.0, 60.0, 0.15, False),
+    ],
+    ids=["at once", "a minute later", "nobody saw when", "it comes back", "something else beside where it stood"],
 )
 def test_furniture_is_not_pushed_for_a_minute(rested: float, empty_until: float, away: float, is_it: bool) -> None:
     put, gone = thin((2.5 - away, 2.0)), [Piece(1.0, 2.5, 2.0, 0.07, 1.0)]

@@ -25,9 +25,10 @@ _PUSHED_M, _PUSHED_S, _ALONE_S, _WIDTH_M = 1.3, 15.0, 6.0, 0.02
 _THIN_M, _GROUP_M, _GROUP_S = 0.065, 0.75, 10.0
 #: Its width is the same within this (m) and as far as the beams tell.
 _THIN_WIDTH_M = 0.01
-#: Two pieces of one surface are so near each other (m), and one is seen to have gone so long (s) after the other; what
-#: has come back stands so near where it stood.
+#: Two pieces of one surface are so near each other (m), and one is seen to have gone so long (s) after the other.
 _BESIDE_M, _TOGETHER_GONE_S = 0.1, 15.0
+#: What has come back stands where it stood, but for this (m).
+_BACK_M = 0.03
 #: The legs of a chair that was moved stand still within so long (s), at least so far from each other (m).
 _TOGETHER_S, _LEGS_M = 2.0, 0.2
 #: What was somebody's foot, and has not been seen for so long (s), was lifted.
@@ -195,7 +196,7 @@ class Furniture:
             thin = width < _THIN_M
             away = math.hypot(piece.x - print_["x"], piece.y - print_["y"])
             late = empty_until - piece.t > (_PUSHED_S if thin else _ALONE_S)
-            if late and away > 0.5 * (piece.width + width) + _BESIDE_M:
+            if late and away > 0.5 * (piece.width + width) + _BACK_M:
                 # It may come back to where it stood whenever it likes.
                 continue
             if thin and not self._grouped(piece, pieces, _THIN_M + spacing):
