@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.scan.components import SIGMA_M, SIGMA_PER_M, adopt
 from tms_agents.floor.scan.faint import FAINT, LATER_S, believe
 from tms_agents.floor.scan.returning import GONE_S, whole
 from tms_agents.floor.settings import FloorSettings
@@ -17,8 +18,6 @@ States = NDArray[np.int8]
 UNKNOWN, NO_ECHO, BACKGROUND, FOREGROUND, BEYOND = 0, 1, 2, 3, 4
 
 _COMPONENTS = 4
-#: No range finder of this class is better than this (m, and per metre); residuals seldom tell less.
-_SIGMA_M, _SIGMA_PER_M = 0.003, 0.0012
 #: A settled component weighs so much; what intermittent beams show less often is not believed.
 _WEIGHT = 0.06
 #: What a beam shows in more of the scans than this is what it mostly ends at.
@@ -175,7 +174,7 @@ def _learn(
             for j in range(k):
                 weight[i, j] *= 1.0 - rate
             continue
-        floor = _SIGMA_M + _SIGMA_PER_M * r
+        floor = SIGMA_M + SIGMA_PER_M * r
         best, least = -1, 0
         nearest = np.inf
         for j in range(k):
@@ -221,38 +220,6 @@ def _learn(
                     weight[i, best] = 0.4
         elif states[i] == BACKGROUND:
             beyond[i] = max(0.0, beyond[i] - dt)
-
-
-@njit(cache=True)
-def _adopt(
-    beams: NDArray[np.int64],
-    ranges: Array,
-    share: float,
-    threshold: float,
-    centre: Array,
-    sigma: Array,
-    weight: Array,
-    empty: Array,
-    missing: Array,
-) -> None:
-    """Make ``ranges`` (m,) m, seen now, the background of ``beams`` (m,) with the weight ``share``, in place."""
-    for b in range(beams.size):
-        i, r = beams[b], ranges[b]
-        target = 0
-        for j in range(centre.shape[1]):
-            if weight[i, j] > 0.0 and abs(r - centre[i, j]) < threshold:
-                target = j
-                break
-            if weight[i, j] < weight[i, target]:
-                target = j
-        missing[i, target] = 0.0
-        if weight[i, target] >= share:
-            continue
-        for j in range(centre.shape[1]):
-            weight[i, j] *= 1.0 - share
-        empty[i] *= 1.0 - share
-        centre[i, target], weight[i, target] = r, share
-        sigma[i, target] = 2.0 * (_SIGMA_M + _SIGMA_PER_M * r)
 
 
 class Background:
@@ -375,7 +342,7 @@ class Background:
 
     def adopt(self, beams: NDArray[np.int64], ranges: Array, share: float = 0.3) -> None:
         """Something that stands there belongs to the room: (m,) beams and their ranges (m,) m."""
-        _adopt(
+        adopt(
             beams,
             ranges,
             share,
