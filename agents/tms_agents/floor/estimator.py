@@ -49,8 +49,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 20: when pieces of the background have gone, and what sensors tell of each other's scales.
-_FORMAT = 20
+#: Of saved states; 21: fields of a body in another order.
+_FORMAT = 21
 
 
 class FloorEstimator:

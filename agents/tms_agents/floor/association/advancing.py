@@ -9,11 +9,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.association.adopting import Pool, adopt_from, chosen, complete
-from tms_agents.floor.association.hypotheses import ALL, FEET, Hypotheses, copy, exchange, first_like, same_places
+from tms_agents.floor.association.hypotheses import Hypotheses, copy, exchange, first_like, same_places
 from tms_agents.floor.association.identity import unite
 from tms_agents.floor.association.proposing import WORSE, Children, propose
 from tms_agents.floor.feet.bodies import predict
 from tms_agents.floor.scan.clustered import ClusteredScan
+from tms_agents.floor.state import FEET
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -72,15 +73,15 @@ def advance(
             pool,
             pooled,
         )
+        score = child_score[o] - least + unseen
+        if _united(after, kept, top, score, scores, scattered, scratch):
+            continue
         nobodys_at = after.nobodys_at[kept]
         nobodys_at[:] = now.nobodys_at[parent]
         for i in range(m):
             if free[i] and of[i] >= 0:
                 nobodys_at[of[i]] = t
         complete(bodies, scan, free, sight)
-        score = child_score[o] - least + unseen
-        if _united(after, kept, top, score, scores, scattered, scratch):
-            continue
         for i in range(m):
             owned[kept, i] = not free[i]
         scores[kept] = score
@@ -109,7 +110,7 @@ def _compare(now: Hypotheses, t: float, first: Integers, alike: Integers) -> int
         for b in range(bodies.shape[1]):
             if bodies[h, b].used:
                 top = max(top, b + 1 if bodies[h, b].confirmed else 0)
-                g = first_like(raw, ALL, h, b)
+                g = first_like(raw, raw.shape[2], h, b)
                 first[h, b] = g
                 alike[h, b] = alike[g, b] if g < h else first_like(raw, FEET, h, b)
     return top

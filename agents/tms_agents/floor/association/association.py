@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.association.adopting import Pool
 from tms_agents.floor.association.advancing import advance
-from tms_agents.floor.association.hypotheses import FEET, nothing_known, settle
+from tms_agents.floor.association.hypotheses import nothing_known, settle
 from tms_agents.floor.association.identity import christen, renamed
 from tms_agents.floor.feet.bodies import begin
 from tms_agents.floor.feet.build import agree
@@ -19,7 +19,7 @@ from tms_agents.floor.feet.shine import expected, scatter
 from tms_agents.floor.scan.clustered import BLANK, ClusteredScan
 from tms_agents.floor.scan.masks import joined
 from tms_agents.floor.settings import Polygon
-from tms_agents.floor.state import BODY, empty, pack, unpack
+from tms_agents.floor.state import BODY, FEET, empty, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class Association:
 
     def decide_changed(self) -> None:
         """The same of everybody who is another one since `mark`."""
-        self._decided |= (self._before[0] != self._now.raw[0])[:, FEET].any(axis=1)
+        self._decided |= (self._before[0] != self._now.raw[0])[:, :FEET].any(axis=1)
 
     def settle(self) -> None:
         """What has changed since `mark` is so in all hypotheses in which it was as in the best."""

@@ -8,26 +8,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.state import BODY, empty
+from tms_agents.floor.state import BODY, CERTAIN, FEET, empty
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Bodies so near each other (m, each axis), on the same prints, going alike (m/s, each axis), are at the same place.
 _NEAR_M, _ALIKE = 0.08, 0.3
-#: What was seen of somebody since it was last in doubt who he is: another doubt, another time.
-_LATELY = ("look", "look_n", "pace", "pace_n", "girth", "girth_n", "sole", "sole_n", "sure")
-#: What has nothing to do with whose foot a cluster is.
-BESIDES = (
-    *("told_x", "told_y", "told_at", "clear", "lone", "lone_x", "lone_y", "rest_x", "rest_y", "rest_at", "pushed"),
-    *("stay_x", "stay_y", "stay", "stay_broad", "stay_thin", "stay_lands", "broadest", "spacing"),
-    *("quality", "single", "still", "older", "odd", "suspected", *_LATELY),
-)
-_NAMES = BODY.names or ()
-#: Indices in records of integers: of all fields, of those that have to do with it, and of what is found of the best.
-ALL = np.arange(len(_NAMES))
-FEET = np.array([index for index, field in enumerate(_NAMES) if field not in BESIDES])
-FOUND = np.array([index for index, field in enumerate(_NAMES) if field not in _LATELY])
+#: So many integers of a body are compared first: most that differ do so in these.
+_FIRST = 16
 
 
 class Hypotheses(NamedTuple):
@@ -88,8 +77,8 @@ def same_places(one: Any, two: Any, top: int, of: Integers) -> bool:
 
 
 @njit(cache=True)
-def first_like(raw: Integers, fields: Integers, h: int, row: int) -> int:
-    """The first hypothesis in which the body ``row`` is exactly as in hypothesis h, in these fields of ``raw``."""
+def first_like(raw: Integers, fields: int, h: int, row: int) -> int:
+    """The first hypothesis in which the body ``row`` is as in hypothesis h, in the first ``fields`` of ``raw``."""
     g = 0
     while g < h and not _equal(raw, g, raw, h, row, fields):
         g += 1
@@ -97,13 +86,17 @@ def first_like(raw: Integers, fields: Integers, h: int, row: int) -> int:
 
 
 @njit(cache=True)
-def _equal(one: Integers, g: int, two: Integers, h: int, row: int, fields: Integers) -> bool:
-    """Whether the body ``row`` is the same in these fields of one[g] and of two[h], both as integers."""
-    # No views of the rows: to count who uses them would take longer than to look.
-    k = 0
-    while k < fields.size and one[g, row, fields[k]] == two[h, row, fields[k]]:
-        k += 1
-    return k == fields.size
+def _equal(one: Integers, g: int, two: Integers, h: int, row: int, fields: int) -> bool:
+    """Whether the body ``row`` is the same in the first ``fields`` of one[g] and of two[h], both as integers."""
+    # No views of the rows: to count who uses them would take longer than to look. All are looked at, many at a time.
+    differ = 0
+    for k in range(_FIRST):
+        differ |= one[g, row, k] ^ two[h, row, k]
+    if differ:
+        return False
+    for k in range(_FIRST, fields):
+        differ |= one[g, row, k] ^ two[h, row, k]
+    return differ == 0
 
 
 @njit(cache=True)
@@ -151,7 +144,7 @@ def settle(some: Hypotheses, before: Integers, decided: NDArray[np.bool_], score
             nobodys_at[kept] = nobodys_at[h]
         for b in range(n):
             if bodies[kept, b].used and _equal(raw, kept, before, 0, b, FEET):
-                for field in FOUND:
+                for field in range(CERTAIN):
                     raw[kept, b, field] = raw[0, b, field]
         kept += 1
     return kept

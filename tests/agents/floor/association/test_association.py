@@ -10,10 +10,10 @@ import pytest
 from tms_agents.floor import FloorEstimator, Sensor
 from tms_agents.floor.association import association
 from tms_agents.floor.association.association import Association
-from tms_agents.floor.association.hypotheses import BESIDES
 from tms_agents.floor.feet import likelihood
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.scan.clustered import ClusteredScan
+from tms_agents.floor.state import BODY, FEET
 from tms_agents.simulation.floor_world import FloorWorld
 
 
@@ -42,7 +42,7 @@ def test_whose_foot_it_is_has_nothing_to_do_with_the_rest(feet: Any, monkeypatch
     def step(self: Association, scan: ClusteredScan, sight: Any) -> Any:
         bodies = self.bodies.copy()
         other = bodies.copy()
-        for field in BESIDES:
+        for field in (BODY.names or ())[FEET:]:
             other[field] = rng.integers(0, 100, other.size)
         free = np.ones(scan.clusters.size, np.bool_)
         for row in np.flatnonzero(bodies["used"]).tolist():
