@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.association.adopting import Pool, adopt_from, chosen, complete
 from tms_agents.floor.association.hypotheses import Hypotheses, copy, exchange, first_like, same_places
 from tms_agents.floor.association.identity import unite
-from tms_agents.floor.association.proposing import WORSE, Children, propose
+from tms_agents.floor.association.proposing import next_best, nowhere, propose
 from tms_agents.floor.feet.bodies import predict
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.state import FEET
@@ -41,22 +41,21 @@ def advance(
     # Out of the loops: whenever a field of a tuple is taken, its users are counted.
     before, of, t = now.bodies, scan.of, scan.t
     kept_most, n, m = before.shape[0], before.shape[1], scan.clusters.size
-    most = count * (m + 1)
-    child_score, child_parent, child_columns = np.empty(most), np.empty(most, np.int64), np.full((most, m), -1)
-    children = Children(child_score, child_parent, child_columns)
     first, alike = np.empty((count, n), np.int64), np.empty((count, n), np.int64)
     top = _compare(now, t, first, alike)
-    many = propose(now, alike, top, scores, scan, children)
+    ways = nowhere(scores[:count], m, top)
+    parents, columns = ways.parent, ways.columns
+    many = propose(now, alike, top, scan, ways)
     rows, scratch = np.empty(n, np.int64), np.empty((2, n))
     owned, free = np.zeros((kept_most, max(m, 1)), np.bool_), np.ones(m, np.bool_)
-    order = np.argsort(child_score[:many])
     pool.last[:] = -1
     kept, pooled = 0, 0
-    least = child_score[order[0]]
-    for o in order:
-        if kept == kept_most or child_score[o] > least + WORSE:
+    least = ways.score[:many].min()
+    while kept < kept_most:
+        o, worse = next_best(ways, many, least)
+        if worse == np.inf:
             break
-        parent, bodies, beliefs = child_parent[o], after.bodies[kept], after.beliefs[kept]
+        parent, bodies, beliefs = parents[o], after.bodies[kept], after.beliefs[kept]
         copy(before[parent], now.beliefs[parent], bodies, beliefs, False)
         k = chosen(before[parent], 1, rows)
         free[:] = True
@@ -65,7 +64,7 @@ def advance(
             first[parent],
             bodies,
             rows[:k],
-            child_columns[o],
+            columns[o],
             scan,
             free,
             sight,
@@ -73,7 +72,7 @@ def advance(
             pool,
             pooled,
         )
-        score = child_score[o] - least + unseen
+        score = worse + unseen
         if _united(after, kept, top, score, scores, scattered, scratch):
             continue
         nobodys_at = after.nobodys_at[kept]

@@ -35,13 +35,24 @@ class Work(NamedTuple):
 
 
 @njit(cache=False)
-def work(m: int, n: int) -> Work:
-    """For tables of m rows and n columns at most."""
+def work(count: int, m: int, n: int) -> Work:
+    """For so many tables of m rows and n columns at most: `one_of` them."""
     # Not cached: loaded from a cache after a kernel that contains it, what gives Python a named tuple crashes.
-    columns, counts, of_column = np.empty((m, n), np.int64), np.empty(m, np.int64), np.empty(n, np.int64)
-    path, met = np.empty(n, np.int64), np.empty(n, np.int64)
-    shortest, reached = np.full(n, np.inf), np.zeros(n, np.bool_)
-    return Work(columns, counts, of_column, np.empty(m), np.empty(n), path, shortest, met, reached)
+    columns, counts = np.empty((count, m, n), np.int64), np.empty((count, m), np.int64)
+    of_column, u, v = np.empty((count, n), np.int64), np.empty((count, m)), np.empty((count, n))
+    path, met = np.empty((1, n), np.int64), np.empty((1, n), np.int64)
+    shortest, reached = np.full((1, n), np.inf), np.zeros((1, n), np.bool_)
+    return Work(columns, counts, of_column, u, v, path, shortest, met, reached)
+
+
+@njit(cache=True, inline="always")
+def one_of(several: Work, h: int) -> Work:
+    """Of what is there for ``several`` tables what belongs to table h: searches in all of them share the rest."""
+    columns, counts, of_column = several.columns[h], several.counts[h], several.of_column[h]
+    u, v = several.u[h], several.v[h]
+    return Work(
+        columns, counts, of_column, u, v, several.path[0], several.shortest[0], several.met[0], several.reached[0]
+    )
 
 
 @njit(cache=True)
@@ -51,7 +62,7 @@ def assign(cost: Array, shared: int, most: float, of_row: Integers) -> float:
     Of the first ``shared`` columns each row may have those in which it costs less than ``most``, and of the others, if
     there are any, its own: the first is that of the first row. There must be a solution.
     """
-    return float(solve(cost, shared, most, of_row, work(cost.shape[0], cost.shape[1])))
+    return float(solve(cost, shared, most, of_row, one_of(work(1, cost.shape[0], cost.shape[1]), 0)))
 
 
 @njit(cache=True)
@@ -94,6 +105,12 @@ def solve(cost: Array, shared: int, most: float, of_row: Integers, w: Work) -> f
             if i == start:
                 break
     return _total(cost, of_row)
+
+
+@njit(cache=True)
+def at_least(cost: Array, row: int, barred: int, w: Work) -> float:
+    """How much more any assignment costs, after `solve`, in which ``row`` has none of the columns `reassign` bars."""
+    return float(_cheapest(cost, w, row, barred)[1] - w.u[row])
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.association.adopting import chosen
-from tms_agents.floor.association.assignment import reassign, solve, work
+from tms_agents.floor.association.assignment import Work, at_least, one_of, reassign, solve, work
 from tms_agents.floor.association.hypotheses import Hypotheses
 from tms_agents.floor.feet.likelihood import feet
 from tms_agents.floor.feet.nobodys import goes_on, known, nobodys, spanned
@@ -20,42 +20,69 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: How much worse (negative log likelihood) a hypothesis may be than the best, and than its parent.
-WORSE, _BRANCH = 18.0, 10.0
+WORSE, BRANCH = 18.0, 10.0
 
 
-class Children(NamedTuple):
-    """Ways to go on: the ``score`` (c,) of each, its ``parent`` (c,), and the ``columns`` (c, m) of the clusters."""
+class Ways(NamedTuple):
+    """Ways to go on, c at most, of as many hypotheses as h: `nowhere` makes it.
+
+    The ``score`` (c,) of each, its ``parent`` (c,), and the ``columns`` (c, m) of the clusters. Where ``moved`` (c,) is
+    a cluster, not -1, its parent's best way is in ``columns``: that cluster must not be who it is there, which costs
+    ``score`` at least, and `next_best` finds out what else it may be.
+
+    Of the hypotheses: their ``scores`` (h,); in ``costs`` (h, ..) a table (m, 2k + m) each of what a cluster costs as
+    whose foot, of so many ``people`` (h,); what the ``best`` (h,) way costs, and how that was ``solved``.
+    """
 
     score: Array
     parent: Integers
     columns: Integers
+    moved: Integers
+    scores: Array
+    costs: Array
+    people: Integers
+    best: Array
+    solved: Work
+
+
+@njit(cache=False)
+def nowhere(scores: Array, m: int, top: int) -> Ways:
+    """None yet, for hypotheses with such ``scores`` (h,), m clusters, and ``top`` people at most."""
+    # Not cached, as `work`.
+    count, n = scores.size, 2 * top + m
+    most = count * (m + 1)
+    score, parent, moved = np.empty(most), np.empty(most, np.int64), np.empty(most, np.int64)
+    people, best = np.empty(count, np.int64), np.empty(count)
+    columns, costs = np.full((most, m), -1), np.empty((count, m * n))
+    # `advance` fills the scores of the next hypotheses while these are needed.
+    return Ways(score, parent, columns, moved, scores.copy(), costs, people, best, work(count, m, n))
 
 
 @njit(cache=True)
-def propose(now: Hypotheses, alike: Integers, top: int, scores: Array, scan: ClusteredScan, children: Children) -> int:
-    """Fill ``children`` with how each hypothesis may go on, its ``scores`` (kept,) being what they are; how many.
+def propose(now: Hypotheses, alike: Integers, top: int, scan: ClusteredScan, ways: Ways) -> int:
+    """Fill ``ways`` with how each hypothesis may go on, but for what `next_best` finds out: how many there are.
 
     The best assignment, and the best in which one cluster is not who it is there. ``alike`` (count, n) is in which
     hypothesis each body was the same first, for `feet`: most people are the same in all. All who are believed are among
     the first ``top``.
     """
-    score, parent, ways = children.score, children.parent, children.columns
+    score, parent, moved, scores = ways.score, ways.parent, ways.moved, ways.scores
     count, n, m = alike.shape[0], now.bodies.shape[1], scan.clusters.size
     rows = np.empty(n, np.int64)
-    everything, columns, other = np.ones(m, np.bool_), np.empty(m, np.int64), np.empty(m, np.int64)
+    everything, columns = np.ones(m, np.bool_), np.empty(m, np.int64)
     told = np.empty((count, top, m, 2))
-    table, solved = np.empty(m * (2 * top + m)), work(m, 2 * top + m)
     spans = np.empty(m)
     spanned(scan.clusters, spans)
-    many, least = 0, np.inf
+    many = 0
     for h in range(count):
         bodies = now.bodies[h]
         k = chosen(bodies, 1, rows)
+        moved[many], parent[many] = -1, h
         if m == 0 or k == 0:
-            score[many], parent[many] = scores[h], h
+            score[many] = scores[h]
             many += 1
             continue
-        cost = table[: m * (2 * k + m)].reshape(m, 2 * k + m)
+        cost = ways.costs[h, : m * (2 * k + m)].reshape(m, 2 * k + m)
         for column in range(k):
             row = rows[column]
             like = alike[h, row]
@@ -66,19 +93,39 @@ def propose(now: Hypotheses, alike: Integers, top: int, scores: Array, scan: Clu
         nobodys(scan, bodies, rows[:k], spans, cost[:, 2 * k :])
         known(scan, bodies, cost[:, 2 * k :])
         goes_on(scan, bodies, now.nobodys_at[h], cost[:, 2 * k :])
+        solved = one_of(ways.solved, h)
         best = solve(cost, 2 * k, UNLIKELY, columns, solved)
-        score[many], parent[many] = scores[h] + best, h
-        least = min(least, scores[h] + best)
-        # What is worse is given up anyway.
-        most = min(_BRANCH, least + WORSE - scores[h] - best)
-        ways[many] = columns
+        ways.people[h], ways.best[h] = k, best
+        score[many], ways.columns[many] = scores[h] + best, columns
         many += 1
         for i in range(m):
             if columns[i] >= 2 * k:
                 continue
-            total = reassign(cost, columns, i, columns[i] // 2 * 2, 1.01 * most, other, solved)
-            if total - best < most:
-                score[many], parent[many] = scores[h] + total, h
-                ways[many] = other
+            more = at_least(cost, i, columns[i] // 2 * 2, solved)
+            if more < BRANCH:
+                score[many], parent[many], moved[many] = scores[h] + best + more, h, i
+                ways.columns[many] = columns
                 many += 1
     return many
+
+
+@njit(cache=True)
+def next_best(ways: Ways, many: int, least: float) -> tuple[int, float]:
+    """The best of so many ways that was not taken yet, and how much worse than ``least``, the best of all, it is.
+
+    It is taken now; inf: there is none that counts. Of those that are too bad hardly any is worked out.
+    """
+    score, m = ways.score, ways.columns.shape[1]
+    other = np.empty(m, np.int64)
+    while True:
+        o = int(np.argmin(score[:many]))
+        i, h, worse = ways.moved[o], ways.parent[o], score[o] - least
+        if i < 0 or worse > WORSE:
+            score[o] = np.inf
+            return o, worse if worse <= WORSE else np.inf
+        columns, k, best = ways.columns[o], ways.people[h], ways.best[h]
+        cost = ways.costs[h, : m * (2 * k + m)].reshape(m, 2 * k + m)
+        most = min(BRANCH, least + WORSE - ways.scores[h] - best)
+        total = reassign(cost, columns, i, columns[i] // 2 * 2, 1.01 * most, other, one_of(ways.solved, h))
+        columns[:] = other
+        score[o], ways.moved[o] = ways.scores[h] + total if total - best < most else np.inf, -1
