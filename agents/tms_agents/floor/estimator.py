@@ -145,7 +145,8 @@ class FloorEstimator:
             view.index,
             self._looks,
         )
-        clusters = self._masks(view.segment(view.ranges, states, view.claimed, view.background.longest, view.rays))
+        known = view.background.longest, view.background.steady
+        clusters = self._masks(view.segment(view.ranges, states, view.claimed, *known, view.rays))
         if not view.background.learned:
             clusters = clusters[: backed(clusters)]
         clusters = clusters[: self._footprints.step(view, clusters, t, lambda: self._pieces(t))]
@@ -153,7 +154,7 @@ class FloorEstimator:
             clusters = clusters[: self._tracks.flickering.step(view, clusters, bodies, t)]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]
-        follow(clusters, of, prints, view.index, t, view.background.steady, *view.sight)
+        follow(clusters, of, prints, view.index, t, *view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
         marks = self._marks[: clusters.size]
         increment_s = view.sensor.sweep.time_increment_s

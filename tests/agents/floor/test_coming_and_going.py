@@ -303,7 +303,7 @@ def test_one_beam_of_a_dark_leg_may_be_somebody(silence: float) -> None:
     for beside in (silence, 8.0):
         ranges, states = scan({49: beside, 50: 2.5, 51: beside} if math.isfinite(beside) is False else {50: 2.5})
         segment = Segmenter(np.full(101, STEP), math.radians(15))
-        (cluster,) = segment(ranges, states, np.zeros(101, np.bool_), OPEN[2], rays)
+        (cluster,) = segment(ranges, states, np.zeros(101, np.bool_), OPEN[2], OPEN[2], rays)
         found.append((int(cluster["cut"]), bool(narrow(cluster))))
     assert found == [(FADES, False), (0, True)]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.association.adopting import Pool, adopt_from, chosen, complete
 from tms_agents.floor.association.hypotheses import Hypotheses, copy, exchange, first_like, same_places
 from tms_agents.floor.association.identity import unite
-from tms_agents.floor.association.proposing import next_best, nowhere, propose
+from tms_agents.floor.association.proposing import next_best, no_ways, propose
 from tms_agents.floor.feet.bodies import predict
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.state import FEET
@@ -43,7 +43,7 @@ def advance(
     kept_most, n, m = before.shape[0], before.shape[1], scan.clusters.size
     first, alike = np.empty((count, n), np.int64), np.empty((count, n), np.int64)
     top = _compare(now, t, first, alike)
-    ways = nowhere(scores[:count], m, top)
+    ways = no_ways(scores[:count], m, top)
     parents, columns = ways.parent, ways.columns
     many = propose(now, alike, top, scan, ways)
     rows, scratch = np.empty(n, np.int64), np.empty((2, n))

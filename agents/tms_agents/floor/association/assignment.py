@@ -16,7 +16,7 @@ _NOBODY = -1
 
 
 class Work(NamedTuple):
-    """What `solve` leaves for `reassign`, of a table of m rows and n columns at most: `work` makes it.
+    """What `solve` leaves for `reassign`, of a table of m rows and n columns at most: `one_of` those that `work` makes.
 
     columns (m, n) that each row may have, so many (counts (m,)); of_column (n,) the row of each column, or `_NOBODY`;
     u (m,), v (n,) what each row and column costs by itself. Of a search: from which row (path (n,)) and how far

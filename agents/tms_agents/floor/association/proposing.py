@@ -24,7 +24,7 @@ WORSE, BRANCH = 18.0, 10.0
 
 
 class Ways(NamedTuple):
-    """Ways to go on, c at most, of as many hypotheses as h: `nowhere` makes it.
+    """Ways to go on, c at most, of as many hypotheses as h: `no_ways` makes it.
 
     The ``score`` (c,) of each, its ``parent`` (c,), and the ``columns`` (c, m) of the clusters. Where ``moved`` (c,) is
     a cluster, not -1, its parent's best way is in ``columns``: that cluster must not be who it is there, which costs
@@ -46,7 +46,7 @@ class Ways(NamedTuple):
 
 
 @njit(cache=False)
-def nowhere(scores: Array, m: int, top: int) -> Ways:
+def no_ways(scores: Array, m: int, top: int) -> Ways:
     """None yet, for hypotheses with such ``scores`` (h,), m clusters, and ``top`` people at most."""
     # Not cached, as `work`.
     count, n = scores.size, 2 * top + m

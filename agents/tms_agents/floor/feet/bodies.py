@@ -10,7 +10,7 @@ from numba import njit
 from tms_agents.floor.feet.build import knows_feet, size_up, wears_shoes
 from tms_agents.floor.feet.gait import foot, middle, swap
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.segmentation import FADES
+from tms_agents.floor.scan.segmentation import DARK, FADES
 
 #: Acceleration noise (m²/s³) and how fast the memory of a velocity fades while nothing is seen (s).
 _ACCELERATION, _COAST_S = 1.5, 2.0
@@ -151,8 +151,11 @@ def footlike(c: Any) -> float:
 
 @njit(cache=True)
 def _tells(c: Any) -> bool:
-    """Whether what is seen tells if it is a foot, and is not what is left of one behind somebody else or far away."""
-    return bool(c.cut != 2 and not scant(c))
+    """Whether what is seen tells if it is a foot, and is not what is left of one behind somebody else or far away.
+
+    Before dark walls pieces of furniture look as scant.
+    """
+    return bool(c.cut != 2 and (c.open == DARK or not scant(c)))
 
 
 @njit(cache=True)

@@ -28,14 +28,14 @@ def missed(body: Any, t: float, sight: Any, seats: Any) -> float:
 
     Less near ``seats``, as `masks.joined` gives them.
     """
-    ranges, states, longest, pose, first, step = sight
+    ranges, states, steady, pose, first, step = sight
     if body.seen < t and not body.stale and t - body.seen < 1.0:
-        if clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step) == FREE:
+        if clear(body.x, body.y, 0.12, ranges, states, steady, pose, first, step) == FREE:
             return _SITS if _may_sit(body, seats) else _MISS
     elif body.seen == t and _limps(body, t):
         x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
         x, y = 2.0 * body.x - x, 2.0 * body.y - y
-        if clear(x, y, 0.1, ranges, states, longest, pose, first, step) != HIDDEN:
+        if clear(x, y, 0.1, ranges, states, steady, pose, first, step) != HIDDEN:
             return _LIMP
     return 0.0
 
@@ -57,13 +57,13 @@ def _may_sit(body: Any, seats: Any) -> bool:
 @njit(cache=True)
 def expect(bodies: Any, t: float, sight: Any) -> None:
     """Count for all who are not believed yet in how many scans they were seen or should have been (due)."""
-    ranges, states, longest, pose, first, step = sight
+    ranges, states, steady, pose, first, step = sight
     for b in range(bodies.size):
         body = bodies[b]
         if not body.used or body.confirmed:
             continue
         if body.seen < t:
-            view = clear(body.x, body.y, 0.12, ranges, states, longest, pose, first, step)
+            view = clear(body.x, body.y, 0.12, ranges, states, steady, pose, first, step)
             turned = np.arctan2(body.y - pose[1], body.x - pose[0]) - pose[2]
             if view in (HIDDEN, WALLED) or np.isnan(beam_of(turned, first, step, ranges.size)):
                 continue
@@ -81,10 +81,10 @@ def out_of_reach(body: Any, c: Any, t: float, sight: Any) -> bool:
         return False
     if (c.x - body.x) * body.vx + (c.y - body.y) * body.vy > 0.0:
         return False
-    ranges, states, longest, pose, first, step = sight
+    ranges, states, steady, pose, first, step = sight
     ahead = _AHEAD_M / speed
     x, y = body.x + ahead * body.vx, body.y + ahead * body.vy
-    return clear(x, y, 0.05, ranges, states, longest, pose, first, step) == UNSEEN
+    return clear(x, y, 0.05, ranges, states, steady, pose, first, step) == UNSEEN
 
 
 @njit(cache=True)

@@ -89,17 +89,16 @@ def follow(
     prints: Any,
     sensor: int,
     t: float,
-    steady: Array,
     ranges: Array,
     states: NDArray[np.int8],
-    longest: Array,
+    steady: Array,
     pose: Array,
     first: float,
     step: float,
 ) -> None:
     """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster.
 
-    ``steady`` (n,) m is the background where it is not mostly silent (inf: elsewhere), the rest as `clear` takes.
+    The rest is `View.sight`.
     """
     m, p = clusters.size, prints.size
     of[:] = -1
@@ -197,7 +196,7 @@ def follow(
             if t - q.last > _MUTE_S:
                 q.used = 0
         else:
-            view = clear(q.x, q.y, 0.5 * q.width, ranges, states, longest, pose, first, step)
+            view = clear(q.x, q.y, 0.5 * q.width, ranges, states, steady, pose, first, step)
             # In the gap between two walls only the beam that met it tells that it is not there now.
             passed = view == WALLED and q.beams < _SPECK and sensor == q.sensor and _passed(q, ranges)
             faint = view == UNSEEN and blank(q.x, q.y, 0.5 * q.width, ranges, steady, pose, first, step)

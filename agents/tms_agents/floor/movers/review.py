@@ -92,8 +92,8 @@ def _has_come(body: Any, t: float, sight: Any) -> bool:
     a = body.a_seen == t and norm(body.ax - body.x0, body.ay - body.y0) < _STILL_THERE_M
     if a or (body.b_seen == t and norm(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
         return True
-    ranges, _, longest, pose, first, step = sight
-    return bool(vacant(body.x0, body.y0, _BEGAN_M, ranges, longest, pose, first, step))
+    ranges, _, steady, pose, first, step = sight
+    return bool(vacant(body.x0, body.y0, _BEGAN_M, ranges, steady, pose, first, step))
 
 
 @njit(cache=True)

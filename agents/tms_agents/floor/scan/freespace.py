@@ -317,7 +317,7 @@ def clear(
     half: float,
     ranges: Array,
     states: NDArray[np.int8],
-    longest: Array,
+    steady: Array,
     pose: Array,
     first: float,
     step: float,

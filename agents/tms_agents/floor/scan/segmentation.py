@@ -17,9 +17,10 @@ Array = NDArray[np.float64]
 #: range, (first, last) beam, (cut) partly hidden behind something nearer, 2: that is new, (attached) its surface goes
 #: on as background: a piece of furniture or wall, (gap) m to the background behind it, (mirror) seen in a mirror (-1:
 #: directly), (ex, ey) the line from one end to the other, a unit vector, and the sine between it and the beams (slant),
-#: (open) nothing comes back beside it, and nothing is known to be there: there may be more of it.
-#: Of what is dark not every beam comes back: cut `FADES` beside beams that bring nothing.
-FADES = 3
+#: (open) nothing comes back beside it, and nothing is known to be there: there may be more of it, `DARK` if what is
+#: known there is silent mostly.
+#: Of what is dark not every beam comes back: cut `FADES` beside beams that bring nothing, though they do mostly.
+FADES, DARK = 3, 2
 CLUSTER = np.dtype(
     [
         ("x", "f8"),
@@ -94,6 +95,7 @@ def _segment(
     states: NDArray[np.int8],
     claimed: NDArray[np.bool_],
     longest: Array,
+    steady: Array,
     rays: Array,
     step: Array,
     grazing: float,
@@ -101,9 +103,10 @@ def _segment(
 ) -> int:
     """Join neighbouring foreground beams to ``clusters`` (max,); how many there are.
 
-    rays: (n, 10), see `tms_agents.floor.scan.rays`; step: (n,) rad
-    to the next beam. Two points belong together if they are nearer than a surface at the angle ``grazing`` could be
-    (Borges and Aldon, "Line extraction in 2D range images", 2004); one beam between may be missing.
+    longest, steady: (n,) m, the background, and where it is not mostly silent (inf elsewhere); rays: (n, 10), see
+    `tms_agents.floor.scan.rays`; step: (n,) rad to the next beam. Two points belong together if they are nearer than a
+    surface at the angle ``grazing`` could be (Borges and Aldon, "Line extraction in 2D range images", 2004); one beam
+    between may be missing.
     """
     n = ranges.size
     count = 0
@@ -173,10 +176,10 @@ def _segment(
             if 0 <= side < n and ranges[side] < c.near - 0.1 and not np.isnan(ranges[side]):
                 c.cut = max(c.cut, 1 if states[side] == BACKGROUND else 2)
         for side in (a - 1, b + 1):
-            if 0 <= side < n and not np.isfinite(ranges[side]) and np.isfinite(longest[side]) and not c.cut:
+            if 0 <= side < n and not np.isfinite(ranges[side]) and np.isfinite(steady[side]) and not c.cut:
                 c.cut = FADES
-            elif 0 <= side < n and np.isinf(ranges[side]) and not np.isfinite(longest[side]):
-                c.open = 1
+            elif 0 <= side < n and np.isinf(ranges[side]) and not np.isfinite(steady[side]):
+                c.open = DARK if np.isfinite(longest[side]) else max(c.open, 1)
         middle = (a + b) // 2
         c.gap = longest[middle] - ranges[middle]
         shift = _DEPTH * min(c.width, 0.5)
@@ -284,10 +287,16 @@ class Segmenter:
         self._clusters = np.zeros(most, CLUSTER)
 
     def __call__(
-        self, ranges: Array, states: NDArray[np.int8], claimed: NDArray[np.bool_], longest: Array, rays: Array
+        self,
+        ranges: Array,
+        states: NDArray[np.int8],
+        claimed: NDArray[np.bool_],
+        longest: Array,
+        steady: Array,
+        rays: Array,
     ) -> Any:
-        """The clusters of one scan (m,) of ``CLUSTER``: ranges, states, claimed, longest (n,), rays (n, 10)."""
-        count = _segment(ranges, states, claimed, longest, rays, self._step, self._grazing, self._clusters)
+        """The clusters of one scan (m,) of ``CLUSTER``: ranges, states, claimed, longest, steady (n,), rays (n, 10)."""
+        count = _segment(ranges, states, claimed, longest, steady, rays, self._step, self._grazing, self._clusters)
         clusters = self._clusters[:count]
         clusters = clusters[: _without_shreds(ranges, clusters)]
         return clusters[: _once(clusters)]

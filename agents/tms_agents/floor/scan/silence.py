@@ -48,14 +48,17 @@ def blank(
 
 @njit(cache=True)
 def vacant(
-    x: float, y: float, half: float, ranges: Array, longest: Array, pose: Array, first: float, step: float
+    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
 ) -> bool:
-    """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent."""
+    """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent.
+
+    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
+    """
     away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
     passes = 0
     for i in range(low, high + 1):
         known = np.isfinite(ranges[i])
-        if (known and abs(ranges[i] - away) > _DEEP_M) or (not known and not np.isfinite(longest[i])):
+        if (known and abs(ranges[i] - away) > _DEEP_M) or (not known and not np.isfinite(steady[i])):
             passes += 1
     return bool(2 * passes >= high - low + 1)
 

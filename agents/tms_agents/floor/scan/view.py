@@ -115,9 +115,9 @@ class View:
 
     @property
     def sight(self) -> tuple[Any, ...]:
-        """What `freespace.clear` needs."""
+        """What `freespace.clear` and `silence.vacant` need."""
         b = self.background
-        return self.ranges, b.states, b.longest, self.pose, self.first, self.step
+        return self.ranges, b.states, b.steady, self.pose, self.first, self.step
 
     @property
     def reach(self) -> tuple[Array, float, Array, Array]:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor.association.assignment import at_least, one_of, reassign, solve, work
-from tms_agents.floor.association.proposing import BRANCH, WORSE, Ways, next_best, nowhere
+from tms_agents.floor.association.proposing import BRANCH, WORSE, Ways, next_best, no_ways
 
 
 @settings(max_examples=60, deadline=None)
@@ -15,7 +15,7 @@ from tms_agents.floor.association.proposing import BRANCH, WORSE, Ways, next_bes
 def test_best_first_and_each_once(hypotheses: int, clusters: int, people: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     scores = np.sort(rng.uniform(0.0, 12.0, hypotheses))
-    ways = nowhere(scores, clusters, people)
+    ways = no_ways(scores, clusters, people)
     many, expected = 0, []
     for h in range(hypotheses):
         cost = np.full((clusters, 2 * people + clusters), 1e6)

@@ -39,7 +39,7 @@ def shoe(length: float, heading: float):
     ranges = cast(SENSOR, discs, WALLS)
     states = np.where(ranges < EMPTY - 0.03, FOREGROUND, BACKGROUND).astype(np.int8)
     segment = Segmenter(STEP, math.radians(10.0))
-    (found,) = segment(ranges, states, np.zeros(ranges.size, np.bool_), EMPTY, rays(SENSOR, SENSOR.pose, []))
+    (found,) = segment(ranges, states, np.zeros(ranges.size, np.bool_), EMPTY, EMPTY, rays(SENSOR, SENSOR.pose, []))
     return found.copy()
 
 

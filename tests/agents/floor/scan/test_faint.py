@@ -81,7 +81,7 @@ def test_no_echo_at_all_speaks_against_what_is_faint_unless_something_is_missed_
     clusters["mirror"] = -1
     for k in range(12):
         found = clusters if k % 4 == 0 else clusters[:0]
-        follow(found, np.zeros(found.size, np.int64), prints, 0, 0.1 * k, wall, *sight)
+        follow(found, np.zeros(found.size, np.int64), prints, 0, 0.1 * k, *sight)
     assert prints["hits"][0] == 3
     assert prints["looks"][0] == (3 if known else 12)
     assert prints["mutes"][0] == (9 if known else 0)
@@ -121,3 +121,20 @@ def test_who_stands_where_a_beam_or_two_come_back_is_not_lost(seed: int, silent:
             away += [min((math.hypot(x - one.xy[0], y - one.xy[1]) for one in estimator.labels()), default=9.0)]
     assert {one.id for one in estimator.labels()} == {1}
     assert np.mean(np.array(away) < 0.5) > 0.97
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4, 9])
+@pytest.mark.parametrize("echoes", [1.0, 0.2])
+def test_who_comes_is_told_as_soon_before_walls_that_seldom_echo(seed: int, echoes: float) -> None:
+    """That nothing comes back from where he began does not tell that something dark still stands there."""
+    laser = Sensor(sweep(beams=683, fan=math.radians(240), reach=5.6), (0.0, 0.0, 0.0))
+    walls = [(4.0, -4.0, 4.0, 4.0), (-4.0, 4.0, 4.0, 4.0), (-4.0, -4.0, 4.0, -4.0)]
+    walk, empty_room = walker([(9.0, 2.0, -1.5), (12.0, 2.0, 1.5)]), cast(laser, [], walls)
+    rng, told = np.random.default_rng(seed), np.inf
+    estimator = FloorEstimator({"A": laser})
+    for k in range(97):
+        ranges = cast(laser, walk(0.1 * k), walls)
+        ranges[(rng.random(683) > echoes) & (ranges >= empty_room - 1e-6)] = np.inf
+        estimator.scan("A", 0.1 * k, np.round(ranges + rng.normal(0.0, 0.006, 683), 3))
+        told = min(told, 0.1 * k) if estimator.labels() else told
+    assert 9.0 < told < 9.55

@@ -12,7 +12,7 @@ from floor_rooms import WALLS, cast, sweep
 from tms_agents.floor import Sensor
 from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND
 from tms_agents.floor.scan.rays import rays
-from tms_agents.floor.scan.segmentation import Segmenter
+from tms_agents.floor.scan.segmentation import DARK, FADES, Segmenter
 
 SENSOR = Sensor(sweep(), (0.05, 0.05, math.pi / 4))
 STEP = np.diff(SENSOR.sweep.angles, append=SENSOR.sweep.angles[-1] + 0.003)
@@ -29,7 +29,7 @@ def clusters(
         ranges[beam] = value
     states = np.where(ranges < empty - 0.03, FOREGROUND, BACKGROUND).astype(np.int8)
     segment = Segmenter(np.abs(STEP), math.radians(15.0))
-    return segment(ranges, states, np.zeros(ranges.size, np.bool_), empty, rays(SENSOR, SENSOR.pose, []))
+    return segment(ranges, states, np.zeros(ranges.size, np.bool_), empty, empty, rays(SENSOR, SENSOR.pose, []))
 
 
 def test_a_round_thing_is_one_cluster_at_its_middle() -> None:
@@ -89,7 +89,7 @@ def test_what_is_seen_directly_and_in_a_mirror_is_one() -> None:
         assert bool(beams[k, 8] < ranges[k]) == mirrored
         places.append(there)
     segment = Segmenter(np.abs(STEP), math.radians(15.0))
-    found = segment(ranges, states, np.zeros(n, np.bool_), np.full(n, 4.0), beams)
+    found = segment(ranges, states, np.zeros(n, np.bool_), np.full(n, 4.0), np.full(n, 4.0), beams)
     assert sorted(one["mirror"] >= 0 for one in found) == [False, True]
     for one in found:
         assert min(math.hypot(one["x"] - x, one["y"] - y) for x, y in (places[0], places[2])) < 0.05
@@ -122,15 +122,26 @@ def test_what_stands_behind_the_edge_of_something_is_no_shred_of_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("around", "behind", "is_open"), [(np.inf, np.inf, True), (np.inf, 4.0, False), (4.0, 4.0, False)]
+    ("around", "behind", "mostly", "is_open", "cut"),
+    [
+        (np.inf, np.inf, np.inf, 1, 0),
+        (np.inf, 4.0, 4.0, 0, FADES),
+        (np.inf, 4.0, np.inf, DARK, 0),
+        (4.0, 4.0, 4.0, 0, 0),
+    ],
+    ids=["nothing is known", "a wall", "a wall that seldom echoes", "seen past"],
 )
-def test_there_may_be_more_of_what_shows_where_nothing_ever_comes_back(
-    around: float, behind: float, is_open: bool
+def test_silence_beside_something_tells_that_it_is_dark_only_where_what_is_behind_is_not_silent(
+    around: float, behind: float, mostly: float, is_open: int, cut: int
 ) -> None:
-    """One beam meets something; those beside it bring ``around`` m, and ``behind`` m is what is known there."""
+    """One beam meets something; those beside it bring ``around`` m, and ``behind`` m is known there, ``mostly`` seen.
+
+    Where nothing comes back anyhow there may be more of it.
+    """
     n = EMPTY.size
     ranges, states = np.full(n, around), np.full(n, BACKGROUND, np.int8)
     ranges[n // 2], states[n // 2] = 3.0, FOREGROUND
     segment = Segmenter(np.abs(STEP), math.radians(15.0))
-    (cluster,) = segment(ranges, states, np.zeros(n, np.bool_), np.full(n, behind), rays(SENSOR, SENSOR.pose, []))
-    assert bool(cluster["open"]) == is_open
+    known = np.full(n, behind), np.full(n, mostly)
+    (cluster,) = segment(ranges, states, np.zeros(n, np.bool_), *known, rays(SENSOR, SENSOR.pose, []))
+    assert (int(cluster["open"]), int(cluster["cut"])) == (is_open, cut)
