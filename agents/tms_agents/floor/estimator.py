@@ -154,7 +154,7 @@ class FloorEstimator:
             clusters = clusters[: self._tracks.flickering.step(view, clusters, bodies, t)]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
         of = self._of[: clusters.size]
-        follow(clusters, of, prints, view.index, t, *view.sight)
+        follow(clusters, of, prints, view.index, t, view.sight)
         feet = set_aside(clusters, of, prints, bodies, self._settings.object_width_m, t)
         marks = self._marks[: clusters.size]
         increment_s = view.sensor.sweep.time_increment_s

@@ -314,10 +314,10 @@ def test_one_beam_of_a_dark_leg_may_be_somebody(silence: float) -> None:
     ids=["passes", "stopped before", "met", "silent", "error"],
 )
 def test_a_place_is_empty_if_beams_pass_it_or_cannot_reach_it(beam: float, empty_there: bool) -> None:
-    ranges, _ = scan(dict.fromkeys(range(45, 56), beam))
-    assert vacant(3.0, 0.0, 0.03, ranges, *OPEN[2:]) == empty_there
+    seen = scan(dict.fromkeys(range(45, 56), beam))
+    assert vacant(3.0, 0.0, 0.03, (*seen, *OPEN[2:])) == empty_there
     behind_nothing = np.full(101, np.inf)
-    assert vacant(3.0, 0.0, 0.03, ranges, behind_nothing, *OPEN[3:]) == (empty_there or beam != 3.0)
+    assert vacant(3.0, 0.0, 0.03, (*seen, behind_nothing, *OPEN[3:])) == (empty_there or beam != 3.0)
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,7 @@ def seen(prints: np.ndarray, x: float, width: float, t: float, *, attached: bool
     clusters = np.zeros(1 if width else 0, CLUSTER)
     clusters["x"], clusters["width"], clusters["near"], clusters["n"] = x, width, x, 5
     clusters["spacing"], clusters["mirror"], clusters["attached"] = 0.01, -1, attached
-    follow(clusters, np.zeros(clusters.size, np.int64), prints, 0, t, *COVERED)
+    follow(clusters, np.zeros(clusters.size, np.int64), prints, 0, t, COVERED)
 
 
 def test_what_noise_joins_to_a_wall_now_and_then_is_not_joined_to_it_when_that_happens_in_a_row() -> None:

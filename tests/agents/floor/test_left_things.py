@@ -27,7 +27,7 @@ def seen(prints: np.ndarray, t: float, width: float = 0.1, cut: int = 0) -> None
     clusters = np.zeros(1 if width else 0, CLUSTER)
     clusters["x"], clusters["width"], clusters["near"], clusters["n"] = 1.0, width, 1.0, round(100 * width)
     clusters["spacing"], clusters["mirror"], clusters["cut"] = 0.01, -1, cut
-    follow(clusters, np.zeros(clusters.size, np.int64), prints, 0, t, *COVERED)
+    follow(clusters, np.zeros(clusters.size, np.int64), prints, 0, t, COVERED)
 
 
 @pytest.mark.parametrize(("by_hand", "rested"), [(1, 1.8), (0, 0.0)])

@@ -58,7 +58,7 @@ def seen(prints: np.ndarray, t: float, beams: int, cut: int = 0) -> None:
     clusters = np.zeros(1, CLUSTER)
     clusters["x"], clusters["width"], clusters["near"], clusters["n"] = 1.0, 0.005 * beams, 1.0, beams
     clusters["spacing"], clusters["mirror"], clusters["cut"] = 0.005, -1, cut
-    follow(clusters, np.zeros(1, np.int64), prints, 0, t, *COVERED)
+    follow(clusters, np.zeros(1, np.int64), prints, 0, t, COVERED)
 
 
 @pytest.mark.parametrize(("beams", "cut", "idle"), [(20, 0, 0.0), (20, 1, 3.0), (2, 0, 3.0)])

@@ -17,6 +17,7 @@ from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.feet.shine import learn
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.clustered import ClusteredScan
+from tms_agents.floor.scan.freespace import Sight
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def adopt(
     columns: NDArray[np.int64],
     scan: ClusteredScan,
     free: NDArray[np.bool_],
-    sight: Any,
+    sight: Sight,
 ) -> None:
     """Let the clusters be the feet that ``columns`` (m,) say of the bodies ``rows`` (k,): 2i and 2i + 1 of row i.
 
@@ -68,7 +69,7 @@ def adopt_from(
     columns: NDArray[np.int64],
     scan: ClusteredScan,
     free: NDArray[np.bool_],
-    sight: Any,
+    sight: Sight,
     seats: Any,
     pool: Pool,
     pooled: int,
@@ -113,7 +114,7 @@ def _feet_of(columns: NDArray[np.int64], k: int, free: NDArray[np.bool_]) -> NDA
 
 
 @njit(cache=True)
-def _take(body: Any, a: int, b: int, scan: ClusteredScan, sight: Any) -> None:
+def _take(body: Any, a: int, b: int, scan: ClusteredScan, sight: Sight) -> None:
     """The clusters a and b (-1: none) are the feet of the body."""
     clusters, of, marks, t = scan.clusters, scan.of, scan.marks, scan.t
     for i in (a, b):
@@ -142,7 +143,7 @@ def _take(body: Any, a: int, b: int, scan: ClusteredScan, sight: Any) -> None:
 
 
 @njit(cache=True)
-def complete(bodies: Any, scan: ClusteredScan, free: NDArray[np.bool_], sight: Any) -> None:
+def complete(bodies: Any, scan: ClusteredScan, free: NDArray[np.bool_], sight: Sight) -> None:
     """What the movers that are believed have left goes to those who are not yet, and then begins new ones."""
     clusters, of, prints, t, m = scan.clusters, scan.of, scan.prints, scan.t, scan.clusters.size
     scratch = np.empty(bodies.size, np.int64)

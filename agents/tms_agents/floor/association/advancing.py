@@ -14,6 +14,7 @@ from tms_agents.floor.association.identity import unite
 from tms_agents.floor.association.proposing import next_best, no_ways, propose
 from tms_agents.floor.feet.bodies import predict
 from tms_agents.floor.scan.clustered import ClusteredScan
+from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.state import FEET
 
 Array = NDArray[np.float64]
@@ -28,15 +29,15 @@ def advance(
     count: int,
     scan: ClusteredScan,
     scattered: Array,
-    sight: Any,
+    sight: Sight,
     seats: Any,
     pool: Pool,
     taken: NDArray[np.bool_],
 ) -> int:
     """One scan for the first ``count`` hypotheses of ``now`` with ``scores`` (kept,): how many there are ``after`` it.
 
-    The best is the first. ``scattered`` (3,) is what `shine.scatter` has learned; ``sight`` and ``seats`` as `missed`
-    takes them. ``taken`` (m,) becomes which clusters are somebody's in the best. What was in ``now`` is overwritten.
+    The best is the first. ``scattered`` (3,) is what `shine.scatter` has learned; ``seats`` as `missed` takes them.
+    ``taken`` (m,) becomes which clusters are somebody's in the best. What was in ``now`` is overwritten.
     """
     # Out of the loops: whenever a field of a tuple is taken, its users are counted.
     before, of, t = now.bodies, scan.of, scan.t

@@ -17,6 +17,7 @@ from tms_agents.floor.feet.build import agree
 from tms_agents.floor.feet.left_feet import put
 from tms_agents.floor.feet.shine import expected, scatter
 from tms_agents.floor.scan.clustered import BLANK, ClusteredScan
+from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.scan.masks import joined
 from tms_agents.floor.settings import Polygon
 from tms_agents.floor.state import BODY, FEET, empty, pack, unpack
@@ -55,8 +56,8 @@ class Association:
         """Those of the best hypothesis, until the next scan."""
         return self._now.bodies[0]
 
-    def step(self, scan: ClusteredScan, sight: Any) -> NDArray[np.bool_]:
-        """Take in a scan; ``sight`` is `View.sight`. Which of its clusters are somebody's (m,)."""
+    def step(self, scan: ClusteredScan, sight: Sight) -> NDArray[np.bool_]:
+        """Take in a scan. Which of its clusters are somebody's (m,)."""
         taken = np.zeros(scan.clusters.size, np.bool_)
         self._count = advance(
             self._now,

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, beam_of, clear
+from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, beam_of, clear
 from tms_agents.floor.scan.masks import distance
 
 #: Negative log likelihood of missing somebody in clear view in one scan.
@@ -23,19 +23,18 @@ _AHEAD_M, _LEAVES, _SWINGS_S = 0.3, 0.5, 0.6
 
 
 @njit(cache=True)
-def missed(body: Any, t: float, sight: Any, seats: Any) -> float:
+def missed(body: Any, t: float, sight: Sight, seats: Any) -> float:
     """Negative log likelihood of not having seen a mover, or a leg of it, that was in view.
 
     Less near ``seats``, as `masks.joined` gives them.
     """
-    ranges, states, steady, pose, first, step = sight
     if body.seen < t and not body.stale and t - body.seen < 1.0:
-        if clear(body.x, body.y, 0.12, ranges, states, steady, pose, first, step) == FREE:
+        if clear(body.x, body.y, 0.12, sight) == FREE:
             return _SITS if _may_sit(body, seats) else _MISS
     elif body.seen == t and _limps(body, t):
         x, y = (body.ax, body.ay) if body.a_seen == t else (body.bx, body.by)
         x, y = 2.0 * body.x - x, 2.0 * body.y - y
-        if clear(x, y, 0.1, ranges, states, steady, pose, first, step) != HIDDEN:
+        if clear(x, y, 0.1, sight) != HIDDEN:
             return _LIMP
     return 0.0
 
@@ -55,15 +54,15 @@ def _may_sit(body: Any, seats: Any) -> bool:
 
 
 @njit(cache=True)
-def expect(bodies: Any, t: float, sight: Any) -> None:
+def expect(bodies: Any, t: float, sight: Sight) -> None:
     """Count for all who are not believed yet in how many scans they were seen or should have been (due)."""
-    ranges, states, steady, pose, first, step = sight
+    ranges, _, _, pose, first, step = sight
     for b in range(bodies.size):
         body = bodies[b]
         if not body.used or body.confirmed:
             continue
         if body.seen < t:
-            view = clear(body.x, body.y, 0.12, ranges, states, steady, pose, first, step)
+            view = clear(body.x, body.y, 0.12, sight)
             turned = np.arctan2(body.y - pose[1], body.x - pose[0]) - pose[2]
             if view in (HIDDEN, WALLED) or np.isnan(beam_of(turned, first, step, ranges.size)):
                 continue
@@ -71,7 +70,7 @@ def expect(bodies: Any, t: float, sight: Any) -> None:
 
 
 @njit(cache=True)
-def out_of_reach(body: Any, c: Any, t: float, sight: Any) -> bool:
+def out_of_reach(body: Any, c: Any, t: float, sight: Sight) -> bool:
     """Whether the cluster is a foot that somebody leaves behind who walks to where the laser does not reach.
 
     Then where his other foot is tells, not that he waits for it.
@@ -81,10 +80,9 @@ def out_of_reach(body: Any, c: Any, t: float, sight: Any) -> bool:
         return False
     if (c.x - body.x) * body.vx + (c.y - body.y) * body.vy > 0.0:
         return False
-    ranges, states, steady, pose, first, step = sight
     ahead = _AHEAD_M / speed
     x, y = body.x + ahead * body.vx, body.y + ahead * body.vy
-    return clear(x, y, 0.05, ranges, states, steady, pose, first, step) == UNSEEN
+    return clear(x, y, 0.05, sight) == UNSEEN
 
 
 @njit(cache=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tms_agents.floor.feet.build import SHOD, SHOES, joined
 from tms_agents.floor.feet.shine import STRANGE, strangeness
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
+from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, clear
 from tms_agents.floor.scan.silence import blank, silent
 
 Array = NDArray[np.float64]
@@ -89,17 +89,9 @@ def follow(
     prints: Any,
     sensor: int,
     t: float,
-    ranges: Array,
-    states: NDArray[np.int8],
-    steady: Array,
-    pose: Array,
-    first: float,
-    step: float,
+    sight: Sight,
 ) -> None:
-    """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster.
-
-    The rest is `View.sight`.
-    """
+    """Match ``clusters`` (m,) with ``prints``, nearest pair first; ``of`` (m,) becomes the print of each cluster."""
     m, p = clusters.size, prints.size
     of[:] = -1
     near = np.full(m, np.inf)
@@ -189,17 +181,17 @@ def follow(
             continue
         if t - q.last > _HIDDEN_S:
             q.used = 0
-        elif silent(q.x, q.y, 0.5 * q.width, ranges, steady, pose, first, step):
+        elif silent(q.x, q.y, 0.5 * q.width, sight):
             q.silent = t
             if sensor == q.sensor:
                 q.mutes += 1
             if t - q.last > _MUTE_S:
                 q.used = 0
         else:
-            view = clear(q.x, q.y, 0.5 * q.width, ranges, states, steady, pose, first, step)
+            view = clear(q.x, q.y, 0.5 * q.width, sight)
             # In the gap between two walls only the beam that met it tells that it is not there now.
-            passed = view == WALLED and q.beams < _SPECK and sensor == q.sensor and _passed(q, ranges)
-            faint = view == UNSEEN and blank(q.x, q.y, 0.5 * q.width, ranges, steady, pose, first, step)
+            passed = view == WALLED and q.beams < _SPECK and sensor == q.sensor and _passed(q, sight[0])
+            faint = view == UNSEEN and blank(q.x, q.y, 0.5 * q.width, sight)
             if (sensor == q.sensor and (view == FREE or faint)) or passed:
                 q.looks += 1
             if view == HIDDEN:

@@ -17,7 +17,7 @@ from tms_agents.floor.feet.build import SHOD, SHOES
 from tms_agents.floor.feet.gait import swap
 from tms_agents.floor.feet.prints import unlike_foot
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.freespace import FREE, clear
+from tms_agents.floor.scan.freespace import FREE, Sight, clear
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _PAIR_M = (0.16, 0.3)
 
 
 @njit(cache=True)
-def _stray(body: Any, prints: Any, t: float, shod: bool, sight: Any) -> int:
+def _stray(body: Any, prints: Any, t: float, shod: bool, sight: Sight) -> int:
     """Which foot is none: 1 the first, 2 the second, 0: both may be feet."""
     a, b = body.a_print, body.b_print
     if a < 0 or b < 0 or a == b or max(t - body.a_seen, t - body.b_seen) > 0.5:
@@ -65,10 +65,10 @@ def _stray(body: Any, prints: Any, t: float, shod: bool, sight: Any) -> int:
 
 
 @njit(cache=True)
-def _has_stepped(q: Any, x: float, y: float, landed: float, sight: Any) -> bool:
+def _has_stepped(q: Any, x: float, y: float, landed: float, sight: Sight) -> bool:
     """Whether the foot that ``landed`` on the print has gone from where it stood, (x, y) m, or has come back there."""
     back = norm(x - q.x, y - q.y) < _BESIDE_M and landed - q.rested < _LANDS_S
-    return bool(back or clear(x, y, _BESIDE_M, *sight) == FREE)
+    return bool(back or clear(x, y, _BESIDE_M, sight) == FREE)
 
 
 @njit(cache=True)
@@ -108,10 +108,10 @@ def take(body: Any, q: Any) -> None:
 
 
 @njit(cache=True)
-def release(bodies: Any, prints: Any, t: float, shoes: Array, sight: Any) -> int:
+def release(bodies: Any, prints: Any, t: float, shoes: Array, sight: Sight) -> int:
     """Take from those of ``bodies`` (n,) that stand on a thing, one of ``prints``, this foot; how many there are.
 
-    ``shoes`` (2,) is what `build.count_shoes` has learned, ``sight`` what `clear` takes.
+    ``shoes`` (2,) is what `build.count_shoes` has learned.
     """
     shod = shoes[0] > SHOD
     count = 0

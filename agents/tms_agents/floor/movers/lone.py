@@ -15,7 +15,7 @@ from tms_agents.floor.feet.build import LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.feet.prints import ALONE, UNLIKE
 from tms_agents.floor.movers.twice import suspected
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.freespace import HIDDEN, clear
+from tms_agents.floor.scan.freespace import HIDDEN, Sight, clear
 
 #: While it is hidden within this (m) where the other foot was seen last, no time counts; a step is longer. Nobody
 #: leaves a foot so far (m) behind, but it may have come and be hidden here: time counts less.
@@ -50,8 +50,8 @@ _SLIVER_M, _SLIVER_S, _SHOE_M = 0.035, 10.0, 0.15
 
 
 @njit(cache=True)
-def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
-    """Note in ``lone`` for how long the body b, seen now, has been one foot alone; ``sight`` is what `clear` takes."""
+def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Sight) -> None:
+    """Note in ``lone`` for how long the body b, seen now, has been one foot alone."""
     body = bodies[b]
     only_a = body.a_seen >= body.b_seen
     foot_x, foot_y = (body.ax, body.ay) if only_a else (body.bx, body.by)
@@ -62,7 +62,7 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Any) -> None:
             body.lone = 0.0
         return
     x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
-    behind = t - at > 0.5 and clear(x, y, _STEP_M, *sight) == HIDDEN
+    behind = t - at > 0.5 and clear(x, y, _STEP_M, sight) == HIDDEN
     if body.lone == 0.0:
         body.lone_x, body.lone_y = foot_x, foot_y
     if body.older > _OLDER_S or suspected(body):

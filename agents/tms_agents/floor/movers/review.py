@@ -14,7 +14,7 @@ from tms_agents.floor.movers.flickering import flickers, note_stay
 from tms_agents.floor.movers.lone import count_lone, has_come, has_walked
 from tms_agents.floor.movers.pair import is_pair
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, clear
+from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, clear
 from tms_agents.floor.scan.masks import distance
 from tms_agents.floor.scan.silence import vacant
 
@@ -87,13 +87,12 @@ def _is_put(bodies: Any, b: int, t: float) -> bool:
 
 
 @njit(cache=True)
-def _has_come(body: Any, t: float, sight: Any) -> bool:
+def _has_come(body: Any, t: float, sight: Sight) -> bool:
     """Whether it has gone from where it began: of something dark that stands there parts flicker, here and there."""
     a = body.a_seen == t and norm(body.ax - body.x0, body.ay - body.y0) < _STILL_THERE_M
     if a or (body.b_seen == t and norm(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
         return True
-    ranges, _, steady, pose, first, step = sight
-    return bool(vacant(body.x0, body.y0, _BEGAN_M, ranges, steady, pose, first, step))
+    return bool(vacant(body.x0, body.y0, _BEGAN_M, sight))
 
 
 @njit(cache=True)
@@ -159,7 +158,7 @@ def _accompanied(bodies: Any, b: int, t: float) -> bool:
 
 
 @njit(cache=True)
-def _comes_out(body: Any, sight: Any) -> bool:
+def _comes_out(body: Any, sight: Sight) -> bool:
     """Whether who walks on behind something would be out of reach, or behind a wall, when it hides him no more."""
     dx, dy = body.x - body.told_x, body.y - body.told_y
     far = norm(dx, dy)
@@ -167,7 +166,7 @@ def _comes_out(body: Any, sight: Any) -> bool:
         return False
     for i in range(1, _LOOKS + 1):
         ahead = i * _LOOK_M / far
-        view = clear(body.x + ahead * dx, body.y + ahead * dy, 0.15, *sight)
+        view = clear(body.x + ahead * dx, body.y + ahead * dy, 0.15, sight)
         if view != HIDDEN:
             return bool(view != FREE)
     return False
@@ -188,7 +187,7 @@ def review(
     bodies: Any,
     t: float,
     dt: float,
-    sight: Any,
+    sight: Sight,
     waits: Waits,
     actions: NDArray[np.int64],
     inside: bool,
@@ -197,7 +196,7 @@ def review(
 ) -> None:
     """What is due for each body, into ``actions``; drops tentative ones that came to nothing.
 
-    ``sight`` is what `clear` takes. ``inside``: walls are known. ``learned``: the room is. ``legs``: it is known that
+    ``inside``: walls are known. ``learned``: the room is. ``legs``: it is known that
     people show legs here, not shoes.
     """
     for b in range(bodies.size):
@@ -222,7 +221,7 @@ def review(
 
 
 @njit(cache=True)
-def _new(bodies: Any, b: int, t: float, sight: Any, waits: Waits, learned: bool) -> int:
+def _new(bodies: Any, b: int, t: float, sight: Sight, waits: Waits, learned: bool) -> int:
     """What is due for a body that is not believed yet; it is dropped if it came to nothing."""
     body = bodies[b]
     unseen = t - body.seen
@@ -272,7 +271,7 @@ def _new(bodies: Any, b: int, t: float, sight: Any, waits: Waits, learned: bool)
 
 
 @njit(cache=True)
-def _seen(bodies: Any, b: int, t: float, dt: float, sight: Any, legs: bool) -> int:
+def _seen(bodies: Any, b: int, t: float, dt: float, sight: Sight, legs: bool) -> int:
     """What is due for a body that is believed, and seen now."""
     body = bodies[b]
     count_lone(bodies, b, t, dt, sight)
@@ -298,11 +297,11 @@ def _seen(bodies: Any, b: int, t: float, dt: float, sight: Any, legs: bool) -> i
 
 
 @njit(cache=True)
-def _not_seen(body: Any, t: float, dt: float, sight: Any, waits: Waits, inside: bool) -> int:
+def _not_seen(body: Any, t: float, dt: float, sight: Sight, waits: Waits, inside: bool) -> int:
     """What is due for a body that is believed, and not seen now."""
     unseen = t - body.seen
     if unseen > (_BEHIND_S if body.footprint else 0.12):
-        view = clear(body.x, body.y, 0.15, *sight)
+        view = clear(body.x, body.y, 0.15, sight)
         if view == FREE:
             body.clear += dt
         elif view == UNSEEN or (view == WALLED and not inside):

@@ -37,6 +37,7 @@ from tms_agents.floor.movers.review import (
 from tms_agents.floor.movers.twice import began, suspect
 from tms_agents.floor.movers.whereabouts import Whereabouts
 from tms_agents.floor.robots.recognizing import may_be_robot
+from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.settings import FloorSettings, Scene
 from tms_agents.floor.state import CONCEALED, SEATED
 
@@ -101,7 +102,7 @@ class Tracks:
         self,
         t: float,
         dt: float,
-        sight: tuple[Any, ...],
+        sight: Sight,
         new_label: Callable[[], int],
         was_furniture: Callable[[Any], bool],
         is_furniture: Callable[[Any], bool],
@@ -109,7 +110,7 @@ class Tracks:
         learned: bool,
         legs: bool = False,
     ) -> list[FloorEvent]:
-        """What happened to the movers in the scan at t, ``dt`` after the sensor's last; ``sight`` as `clear` takes.
+        """What happened to the movers in the scan at t, ``dt`` after the sensor's last.
 
         ``was_furniture`` tells of a body whether a piece of background has gone from where it began, ``is_furniture``
         whether one that looks like it has gone. ``legs``: it is known that people show legs here.

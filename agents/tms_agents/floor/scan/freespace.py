@@ -13,6 +13,10 @@ from tms_agents.floor.scan.background import BACKGROUND, BEYOND, FOREGROUND, NO_
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
+#: What a sensor sees now: how far (n,) m, the state of each beam (n,) as `background.classify` gives it, how far it
+#: looks where the background is not mostly silent (n,) m, inf elsewhere; its pose (3,), and where its first beam points
+#: and how far from beam to beam, rad.
+Sight = tuple[Array, NDArray[np.int8], Array, Array, float, float]
 
 #: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
 #: Half hidden, and seen past where the rest of it was met.
@@ -311,21 +315,12 @@ def _belongs(ranges: Array, states: NDArray[np.int8], i: int, edge: int) -> bool
 
 
 @njit(cache=True)
-def clear(
-    x: float,
-    y: float,
-    half: float,
-    ranges: Array,
-    states: NDArray[np.int8],
-    steady: Array,
-    pose: Array,
-    first: float,
-    step: float,
-) -> int:
+def clear(x: float, y: float, half: float, sight: Sight) -> int:
     """Whether the sensor looks past (x, y) ± half m.
 
     FREE, HIDDEN behind something new, WALLED behind the background, else UNSEEN (out of view or reach).
     """
+    ranges, states, _, pose, first, step = sight
     n = ranges.size
     away = norm(x - pose[0], y - pose[1])
     middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)

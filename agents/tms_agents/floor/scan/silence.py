@@ -4,26 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tms_agents.floor.norm import norm
-from tms_agents.floor.scan.freespace import beam_of
-
-Array = NDArray[np.float64]
+from tms_agents.floor.scan.freespace import Sight, beam_of
 
 #: What stands at a place is met within this (m) before or behind it.
 _DEEP_M = 0.1
 
 
 @njit(cache=True)
-def silent(
-    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
-) -> bool:
-    """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy.
-
-    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
-    """
-    away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+def silent(x: float, y: float, half: float, sight: Sight) -> bool:
+    """Whether half of the beams to (x, y) ± half m echo nothing, though the background there does: black or glossy."""
+    ranges, _, steady, _, _, _ = sight
+    away, low, high = _towards(x, y, half, sight)
     count = 0
     for i in range(low, high + 1):
         if not np.isfinite(ranges[i]) and np.isfinite(steady[i]) and steady[i] > away:
@@ -32,14 +25,10 @@ def silent(
 
 
 @njit(cache=True)
-def blank(
-    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
-) -> bool:
-    """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly.
-
-    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
-    """
-    _, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+def blank(x: float, y: float, half: float, sight: Sight) -> bool:
+    """Whether no beam to (x, y) ± half m echoes anything, nor does the background there, mostly."""
+    ranges, _, steady, _, _, _ = sight
+    _, low, high = _towards(x, y, half, sight)
     for i in range(low, high + 1):
         if not np.isinf(ranges[i]) or np.isfinite(steady[i]):
             return False
@@ -47,14 +36,10 @@ def blank(
 
 
 @njit(cache=True)
-def vacant(
-    x: float, y: float, half: float, ranges: Array, steady: Array, pose: Array, first: float, step: float
-) -> bool:
-    """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent.
-
-    ``steady`` (n,) m: the background where it is not mostly silent; inf elsewhere.
-    """
-    away, low, high = _towards(x, y, half, pose, first, step, ranges.size)
+def vacant(x: float, y: float, half: float, sight: Sight) -> bool:
+    """Whether nothing speaks for something at (x, y) ± half m: beams pass, or are stopped before; none falls silent."""
+    ranges, _, steady, _, _, _ = sight
+    away, low, high = _towards(x, y, half, sight)
     passes = 0
     for i in range(low, high + 1):
         known = np.isfinite(ranges[i])
@@ -64,8 +49,10 @@ def vacant(
 
 
 @njit(cache=True)
-def _towards(x: float, y: float, half: float, pose: Array, first: float, step: float, n: int) -> tuple[float, int, int]:
-    """How far (x, y) is, m, and the first and last of the n beams that meet it ± half m (0 and -1: none)."""
+def _towards(x: float, y: float, half: float, sight: Sight) -> tuple[float, int, int]:
+    """How far (x, y) is, m, and the first and last of the beams that meet it ± half m (0 and -1: none)."""
+    ranges, _, _, pose, first, step = sight
+    n = ranges.size
     away = norm(x - pose[0], y - pose[1])
     middle = beam_of(np.arctan2(y - pose[1], x - pose[0]) - pose[2], first, step, n)
     if np.isnan(middle):

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.scan.background import Background
+from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.scan.rays import rays, views
 from tms_agents.floor.scan.segmentation import Segmenter
 from tms_agents.floor.scan.walls import Fit, held_against
@@ -114,8 +115,8 @@ class View:
         self.move(tuple(saved["pose"]))
 
     @property
-    def sight(self) -> tuple[Any, ...]:
-        """What `freespace.clear` and `silence.vacant` need."""
+    def sight(self) -> Sight:
+        """What it sees now."""
         b = self.background
         return self.ranges, b.states, b.steady, self.pose, self.first, self.step
 

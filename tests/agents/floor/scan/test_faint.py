@@ -81,7 +81,7 @@ def test_no_echo_at_all_speaks_against_what_is_faint_unless_something_is_missed_
     clusters["mirror"] = -1
     for k in range(12):
         found = clusters if k % 4 == 0 else clusters[:0]
-        follow(found, np.zeros(found.size, np.int64), prints, 0, 0.1 * k, *sight)
+        follow(found, np.zeros(found.size, np.int64), prints, 0, 0.1 * k, sight)
     assert prints["hits"][0] == 3
     assert prints["looks"][0] == (3 if known else 12)
     assert prints["mutes"][0] == (9 if known else 0)
