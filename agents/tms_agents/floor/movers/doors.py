@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tms_agents.floor.scan.edges import from_edge
 from tms_agents.floor.scan.masks import Area, distance
-from tms_agents.floor.scan.sight import from_edge
 from tms_agents.floor.state import pack, unpack
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Doors:
         return self.told or bool(self._edges.size)
 
     def see(self, edges: Array) -> None:
-        """These are the edges (k, 4) of what all lasers see (`sight.edges_of_sight`)."""
+        """These are the edges (k, 4) of what all lasers see (`edges.edges_of_sight`)."""
         self._edges = edges
 
     def came(self, x: float, y: float, alone: bool) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tms_agents.floor.movers.doors import Doors
+from tms_agents.floor.scan.edges import beams, edges_of_sight, from_edge, looks_past
 from tms_agents.floor.scan.masks import Area
-from tms_agents.floor.scan.sight import beams, edges_of_sight, from_edge, looks_past
 from tms_agents.floor.scan.view import View
 from tms_agents.floor.settings import Polygon, Scene
 

@@ -122,7 +122,7 @@ class View:
 
     @property
     def reach(self) -> tuple[Array, float, Array, Array]:
-        """What `sight.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
+        """What `edges.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
         farthest = np.minimum(self.background.longest, self.rays[:, 8])
         far = self._reach_m * self.scale
         return farthest, far, np.asarray(self.sensor.sweep.angles, dtype=float), self.pose

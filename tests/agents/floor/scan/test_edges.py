@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from tms_agents.floor.scan.sight import edges_of_sight, from_edge, looks_past
+from tms_agents.floor.scan.edges import edges_of_sight, from_edge, looks_past
 
 Array = NDArray[np.float64]
 HALF = np.radians(np.linspace(-90.0, 90.0, 361))
