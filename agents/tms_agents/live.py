@@ -21,30 +21,37 @@ def socket_path(spool: Path) -> Path:
 
 async def serve_view(path: Path, view: Callable[[], dict[str, Any]]) -> None:
     """Serve until cancelled. The caller owns the spool, so a socket that is there already is a dead one."""
-    viewers = 0
+    viewers: set[asyncio.Task[None]] = set()
 
-    async def show(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        nonlocal viewers
-        viewers += 1
+    async def show(writer: asyncio.StreamWriter) -> None:
         try:
             with contextlib.suppress(ConnectionError):
-                while viewers <= _MAX_VIEWERS:
+                while True:
                     writer.write(json.dumps(view()).encode() + b"\n")
                     await writer.drain()
                     await asyncio.sleep(_PERIOD_S)
         finally:
-            viewers -= 1
             writer.close()
+
+    def come(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(viewers) == _MAX_VIEWERS:
+            writer.close()
+            return
+        viewers.add(task := asyncio.create_task(show(writer)))
+        task.add_done_callback(viewers.discard)
 
     _remove(path)
     with _short(path) as name:
-        server = await asyncio.start_unix_server(show, name)
+        server = await asyncio.start_unix_server(come, name)
     os.chmod(path, 0o600)  # noqa: PTH101 - one quick call
     try:
         await asyncio.Event().wait()
     finally:
         server.close()
         _remove(path)
+        for task in viewers:
+            task.cancel()
+        await asyncio.gather(*viewers, return_exceptions=True)
 
 
 async def views(path: Path) -> AsyncGenerator[dict[str, Any], None]:
@@ -61,6 +68,15 @@ async def views(path: Path) -> AsyncGenerator[dict[str, Any], None]:
                 yield json.loads(line)
     finally:
         writer.close()
+
+
+async def shows(path: Path) -> bool:
+    """Whether an agent runs here and shows what it sees: one that was killed leaves its socket behind."""
+    with contextlib.suppress(OSError):
+        async with contextlib.aclosing(views(path)) as shown:
+            async for _ in shown:
+                return True
+    return False
 
 
 def _remove(path: Path) -> None:

@@ -15,7 +15,7 @@ from tms_agents.cabinet.core import Cabinet
 from tms_agents.cabinet.listening import listen_to_board, listen_to_reader, tick
 from tms_agents.cabinet.view import view_of
 from tms_agents.clocks import Clocks
-from tms_agents.live import socket_path, views
+from tms_agents.live import shows, socket_path, views
 from tms_agents.state import peek_state, state_path
 
 _PERIOD_S = 0.2
@@ -35,19 +35,8 @@ async def watch(
         async with contextlib.aclosing(watch_devices(config, calibrations)) as shown:
             async for view in shown:
                 yield view
-                if socket_path(config.spool.path).exists():
+                if await shows(socket_path(config.spool.path)):
                     break  # an agent started, and needs the devices
-
-
-async def agent_runs(config: CabinetConfig) -> bool:
-    """Whether an agent with this configuration runs now."""
-    try:
-        async with contextlib.aclosing(views(socket_path(config.spool.path))) as shown:
-            async for _ in shown:
-                return True
-    except OSError:
-        pass
-    return False
 
 
 async def watch_devices(

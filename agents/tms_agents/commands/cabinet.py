@@ -20,8 +20,9 @@ from tms_agents.cabinet.measuring import Measuring
 from tms_agents.cabinet.runner import require_calibration
 from tms_agents.cabinet.screen import screen
 from tms_agents.cabinet.sources import open_loads
-from tms_agents.cabinet.watching import agent_runs, watch, watch_devices
+from tms_agents.cabinet.watching import watch, watch_devices
 from tms_agents.config import read_config
+from tms_agents.live import shows, socket_path
 from tms_agents.running import until_signalled
 from tms_client.cli import ArgumentParser, CommandError
 
@@ -78,7 +79,7 @@ async def _measure(
     spots: Sequence[Spot],
     clock: Callable[[], float] = time.time,
 ) -> BoardCalibration:
-    if await agent_runs(config):
+    if await shows(socket_path(config.spool.path)):
         raise CommandError(f"agent {config.agent} is running and has the devices: stop it first")
     source = open_loads(board.load, config.silent_after_s)
     keys = _Keys()
@@ -129,7 +130,7 @@ async def _show_once(
 ) -> None:
     """The agent's next view; the devices' own after they had time to say something."""
     loop = asyncio.get_running_loop()
-    runs = await agent_runs(config)
+    runs = await shows(socket_path(config.spool.path))
     until = loop.time() + (0.0 if runs else arguments.wait)
     views = watch(config, calibrations) if runs else watch_devices(config, calibrations)
     async with contextlib.aclosing(views) as shown:

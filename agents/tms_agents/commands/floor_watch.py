@@ -21,8 +21,7 @@ from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.watch import watching
 from tms_agents.floor.watch.picture import frame_of, png
 from tms_agents.floor.watch.screen import screen
-from tms_agents.live import socket_path
-from tms_agents.live import views as live_views
+from tms_agents.live import shows, socket_path
 from tms_agents.running import until_signalled
 from tms_client.cli import CommandError
 
@@ -77,7 +76,7 @@ async def _paced(played: Iterator[tuple[float, dict[str, Any]]], speed: float) -
 async def _once(arguments: argparse.Namespace, config: FloorConfig, poses: Any) -> None:
     """The agent's next view; the lasers' own after they had time to say something."""
     loop = asyncio.get_running_loop()
-    runs = await _agent_runs(config)
+    runs = await shows(socket_path(config.spool.path))
     until = loop.time() + (1.0 if runs else arguments.wait)
     shown = watching.watch(config, poses) if runs else watching.watch_lasers(config, poses)
     async with contextlib.aclosing(shown) as found:
@@ -85,14 +84,6 @@ async def _once(arguments: argparse.Namespace, config: FloorConfig, poses: Any) 
             if loop.time() >= until:
                 _put(view, arguments.png)
                 return
-
-
-async def _agent_runs(config: FloorConfig) -> bool:
-    with contextlib.suppress(OSError):
-        async with contextlib.aclosing(live_views(socket_path(config.spool.path))) as shown:
-            async for _ in shown:
-                return True
-    return False
 
 
 def _put(view: dict[str, Any], file: Path | None) -> None:

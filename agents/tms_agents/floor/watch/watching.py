@@ -20,7 +20,7 @@ from tms_agents.floor.live_view import LiveView
 from tms_agents.floor.recordings.recorded import Recorded, in_time
 from tms_agents.floor.runner import Understanding, listen
 from tms_agents.floor.settings import Pose
-from tms_agents.live import socket_path, views
+from tms_agents.live import shows, socket_path, views
 from tms_agents.state import peek_state, state_path
 
 _PERIOD_S = 0.2
@@ -39,7 +39,7 @@ async def watch(config: FloorConfig, poses: Mapping[str, Pose]) -> AsyncGenerato
         async with contextlib.aclosing(watch_lasers(config, poses)) as shown:
             async for view in shown:
                 yield view
-                if path.exists():
+                if await shows(path):
                     break  # an agent started, and needs the lasers
 
 
