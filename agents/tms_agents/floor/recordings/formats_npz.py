@@ -49,9 +49,9 @@ def read_npz(path: Path) -> Recorded:
         range_max_m=range_max,
         model=str(values["model"]) if "model" in values else "",
     )
-    intensities = _array(values, "intensities", 2) if "intensities" in values else None
-    if intensities is not None and intensities.shape != ranges.shape:
-        intensities = None  # some drivers announce intensities and send none
+    # Some drivers announce intensities and send none.
+    bright = "intensities" in values and np.shape(values["intensities"]) == ranges.shape
+    intensities = _array(values, "intensities", 2) if bright else None
     return Recorded(path.stem, sweep, _pose(values), t, clean_ranges(ranges, range_min, range_max), intensities)
 
 

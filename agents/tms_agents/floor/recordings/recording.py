@@ -120,27 +120,33 @@ class ScanWriter:
 
 
 def read_recording(path: Path) -> list[Recorded]:
-    """All whole records. Raises ValueError where it is no recording or one in the middle is damaged, OSError."""
-    sensors: dict[int, dict[str, Any]] = {}
-    sweeps: dict[int, Sweep] = {}
-    blocks: dict[int, list[tuple[Array, Array, Array | None]]] = {}
+    """All whole records, of a sensor as long as it sweeps and stands the same, also if it is described again.
+
+    Raises:
+        ValueError: it is no recording, or a record in the middle is damaged.
+        OSError: the file cannot be read.
+    """
+    units: dict[int, float] = {}
+    described: dict[int, str] = {}
+    blocks: dict[str, list[tuple[Array, Array, Array | None]]] = {}
     with path.open("rb") as file:
         for kind, body in _records(file):
             if kind == b"S":
                 told = json.loads(zlib.decompress(body))
-                sensors[told["sensor"]], sweeps[told["sensor"]] = told, _sweep(told)
+                number = told.pop("sensor")
+                units[number], described[number] = told["unit_m"], json.dumps(told)
             elif kind == b"B":
                 number = _BLOCK.unpack_from(body)[0]
-                blocks.setdefault(number, []).append(_unpacked(body, sensors[number]["unit_m"]))
-    return [_joined(sensors[number], sweeps[number], found) for number, found in blocks.items()]
+                blocks.setdefault(described[number], []).append(_unpacked(body, units[number]))
+    return [_joined(json.loads(told), found) for told, found in blocks.items()]
 
 
-def _joined(told: dict[str, Any], sweep: Sweep, blocks: list[tuple[Array, Array, Array | None]]) -> Recorded:
+def _joined(told: dict[str, Any], blocks: list[tuple[Array, Array, Array | None]]) -> Recorded:
     x, y, theta = told["pose"]
     bright = [one[2] for one in blocks if one[2] is not None]
     return Recorded(
         told["name"],
-        sweep,
+        _sweep(told),
         (x, y, theta),
         np.concatenate([one[0] for one in blocks]),
         np.concatenate([one[1] for one in blocks]),

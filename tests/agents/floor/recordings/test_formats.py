@@ -60,6 +60,16 @@ def test_npz_as_simulators_write_it(tmp_path):
     assert found.scan(0).intensities is None
 
 
+def test_intensities_that_were_announced_and_never_sent_are_none(tmp_path):
+    path = tmp_path / "room.npz"
+    told = {"ranges": np.ones((2, 8)), "t": [1.0, 1.1], "angles": np.linspace(-1, 1, 8)}
+    for intensities in ([], np.zeros((2, 0)), np.zeros((2, 3))):
+        np.savez(path, intensities=intensities, **told)
+        assert read_scans(path)[0].intensities is None
+    np.savez(path, intensities=7.0 * np.ones((2, 8)), **told)
+    np.testing.assert_array_equal(read_scans(path)[0].intensities, 7.0)
+
+
 def test_npz_as_ros_has_it_and_times_that_stand_still(tmp_path):
     path = tmp_path / "bag.npz"
     np.savez(

@@ -71,8 +71,12 @@ def test_several_sensors_in_one_file_and_a_writer_that_goes_on(tmp_path):
     writer.close()
     write(path, [walls(one, n) for n in range(30, 40)], start=30)  # the agent was started again
     found = read_recording(path)
-    assert [(one.name, len(one)) for one in found] == [("a", 30), ("b", 30), ("a", 10)]
-    np.testing.assert_allclose(found[2].t[0], 103.0)
+    assert [(one.name, len(one)) for one in found] == [("a", 40), ("b", 30)]
+    assert_holds(found[0], [walls(one, n) for n in range(40)])
+    writer = ScanWriter(path)
+    writer.add("a", (1.0, 2.0, 0.6), 110.0, walls(one, 40))  # it was turned
+    writer.close()
+    assert [(one.name, len(one), one.pose[2]) for one in read_recording(path)[::2]] == [("a", 40, 0.5), ("a", 1, 0.6)]
 
 
 def test_it_is_readable_while_it_is_written(tmp_path):
