@@ -10,7 +10,7 @@ import pytest
 from floor_robots import OPEN
 from floor_rooms import Room, sweep, together, walker
 
-from tms_agents.floor import Appeared, FloorEstimator, Scene, Sensor, Vanished
+from tms_agents.floor import Appeared, FloorEstimator, Moved, Scene, Sensor, Vanished
 from tms_agents.floor.movers.doors import Doors
 from tms_agents.floor.movers.outlook import Outlook
 from tms_agents.floor.scan.masks import Area
@@ -51,6 +51,16 @@ def test_who_comes_after_somebody_has_gone_out_there_is_somebody_new(seats: bool
     assert came[0].t < 9.0 + STAYS_S < left[0].t < 36.0 < came[1].t
     again = FloorEstimator.from_dict(json.loads(json.dumps(estimator.to_dict())), short_sighted(3.9))
     assert again.labels() == estimator.labels() == []
+
+
+@pytest.mark.parametrize("scene", [Scene(), Scene(region=REGION, gates=[GATE])], ids=["nothing told", "gates told"])
+def test_a_laser_of_which_no_reach_is_known_sees_as_far_as_anything_it_has_seen(scene: Scene) -> None:
+    """As in a file of scans that says none; where the wall behind the door is missing nothing echoes."""
+    walls = lambda _: OPEN[:-1]  # noqa: E731
+    room = Room(walker([(9.0, 2.0, 1.2), (20.0, 2.0, 2.5)]), walls, sensors=short_sighted(math.inf))
+    estimator, events = room.play(20.0, scene=scene)
+    assert [type(event) for event in events if not isinstance(event, Moved)] == [Appeared]
+    assert [label.kind for label in estimator.labels()] == ["mover"]
 
 
 @pytest.mark.parametrize(("reach_m", "unseen"), [(3.9, True), (8.0, False)])

@@ -124,7 +124,9 @@ class View:
     def reach(self) -> tuple[Array, float, Array, Array]:
         """What `edges.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
         farthest = np.minimum(self.background.longest, self.rays[:, 8])
-        far = self._reach_m * self.scale
+        # Without a reach that is known it is as far as anything that was seen.
+        seen = float(np.max(farthest, initial=0.0, where=np.isfinite(farthest)))
+        far = self._reach_m * self.scale if np.isfinite(self._reach_m) else seen + 1e-3
         return farthest, far, np.asarray(self.sensor.sweep.angles, dtype=float), self.pose
 
     @property
