@@ -92,7 +92,7 @@ class Floor:
 
     def seen(self) -> list[FloorLabel]:
         """Everything that has a label now."""
-        return [] if self.estimator is None else self.estimator.labels()
+        return [] if self.estimator is None else self.estimator.labels() + self.estimator.awaited()
 
     def believed(self, laser: str) -> tuple[Pose, float]:
         """Where the laser stands, and what it measures times this is how far it is, as far as is known now."""

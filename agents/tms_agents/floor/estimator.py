@@ -49,8 +49,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 21: fields of a body in another order.
-_FORMAT = 21
+#: Of saved states; 22: what was told of movers.
+_FORMAT = 22
 
 
 class FloorEstimator:
@@ -116,8 +116,12 @@ class FloorEstimator:
         return events
 
     def labels(self) -> list[FloorLabel]:
-        """Everything on the floor now, oldest label first."""
+        """Everything on the floor now, oldest label first; without those who are ``awaited``."""
         return sorted(self._tracks.labels(self._t) + self._objects.labels(), key=lambda label: label.id)
+
+    def awaited(self) -> list[FloorLabel]:
+        """Movers who must be in the room and may be anywhere in it, at the place where each was seen last."""
+        return self._tracks.awaited(self._t)
 
     def poses(self) -> dict[str, Pose]:
         """Where the sensors are: as given, or as the walls tell, refined by what several of them have seen at once."""

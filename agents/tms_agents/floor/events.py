@@ -82,6 +82,7 @@ class Back:
     t: float
     label: int
     xy: tuple[float, float]
+    cov: Covariance
 
 
 FloorEvent = Appeared | Moved | Vanished | Stale | Back

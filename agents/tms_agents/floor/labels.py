@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from tms_agents.floor import Appeared, FloorEvent, FloorLabel, Moved, Vanished
+from tms_agents.floor import Appeared, Back, FloorEvent, FloorLabel, Moved, Vanished
 from tms_schemas.events import Near
 from tms_schemas.observation import (
     InventoryLabel,
@@ -154,7 +154,7 @@ class Labels:
             yield from self._entered(event, shift) if event.kind == "mover" else self._lies(event, shift)
         elif isinstance(event, Vanished):
             yield from self._left(event, shift) if event.label in self.movers else self._taken(event, shift)
-        elif isinstance(event, Moved) and (mover := self.movers.get(event.label)) is not None:
+        elif isinstance(event, Moved | Back) and (mover := self.movers.get(event.label)) is not None:
             yield from self._walks(mover, event, shift)
 
     def _entered(self, event: Appeared, shift: float) -> Iterator[Observation]:
@@ -170,7 +170,7 @@ class Labels:
         mover.places.append((t, xy))
         return mover
 
-    def _walks(self, mover: Mover, event: Moved, shift: float) -> Iterator[Observation]:
+    def _walks(self, mover: Mover, event: Moved | Back, shift: float) -> Iterator[Observation]:
         if math.dist(event.xy, mover.xy) > 0.01:
             mover.moved_at = event.t
         mover.xy, mover.cov = event.xy, event.cov

@@ -158,7 +158,6 @@ _OF_FEET = [
 _BESIDES = [
     ("told_x", "f8"),
     ("told_y", "f8"),
-    ("told_at", "f8"),
     ("clear", "f8"),
     ("lone", "f8"),
     ("lone_x", "f8"),

@@ -215,6 +215,7 @@ def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, h
     one = tracks([DOOR], ROOM)
     walker(one.bodies[0], 3.0, 1.0, (0.0, 0.0), NOW - 2.0)
     one.bodies["stale"][0] = 1
+    assert [type(event) for event in at(one, NOW - 0.1)] == [Stale]
     walker(one.bodies[1], 3.5, 1.0, (0.0, 0.0), NOW)
     new = one.bodies[1]
     new["confirmed"], new["own_pace_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0

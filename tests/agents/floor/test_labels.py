@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tms_agents.floor import Appeared, FloorLabel, Moved, Vanished
+from tms_agents.floor import Appeared, Back, FloorLabel, Moved, Vanished
 from tms_agents.floor.labels import Labels
 from tms_schemas.events import Near
 from tms_schemas.observation import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft, Transfer
@@ -75,6 +75,14 @@ def test_what_was_told_is_never_far_from_what_is(steps):
         assert ((told.xy[0] - x) ** 2 + (told.xy[1] - y) ** 2) ** 0.5 < 0.26
     told = [told, *floor.rest(t + 2.0)][-1]
     assert ((told.xy[0] - x) ** 2 + (told.xy[1] - y) ** 2) ** 0.5 < 0.03
+
+
+def test_who_is_back_is_told_to_be_where_he_is():
+    floor = labels()
+    (met,) = floor.observations([mover(10.0, 1, (0.0, 1.0))])
+    (back,) = floor.observations([Back(30.0, 1, (1.2, 1.0), COV)])
+    assert isinstance(back, LabelMoved) and (back.label, back.xy) == (met.label, (1.2, 1.0))
+    assert floor.movers[1].at(30.0) == (1.2, 1.0), "who may have taken something there"
 
 
 def test_one_instant_is_told_in_the_order_of_the_wire():

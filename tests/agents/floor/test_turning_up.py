@@ -39,7 +39,13 @@ def tracks() -> Tracks:
     for name, value in (values | {"own": 7.0, "own_n": 200}).items():
         lost[name] = value
     assert tracks.absent.keep(lost)
+    assert look(tracks, NOW - 0.1) == [Stale(NOW - 0.1, 5)]
+    assert [(one.id, one.xy, one.stale) for one in tracks.awaited(NOW)] == [(5, (4.0, 0.0), True)]
     return tracks
+
+
+def look(tracks: Tracks, t: float) -> list:
+    return tracks.review(t, 0.1, OPEN, lambda: 9, lambda body: False, lambda body: False, learned=True)
 
 
 def later(tracks: Tracks, seconds: float, *, both: bool) -> tuple[list, float]:
@@ -52,7 +58,7 @@ def later(tracks: Tracks, seconds: float, *, both: bool) -> tuple[list, float]:
         if both:
             body["b_seen"], body["by"] = t, 0.25
             body["both"] += 1
-        if events := tracks.review(t, 0.1, OPEN, lambda: 9, lambda body: False, lambda body: False, learned=True):
+        if events := look(tracks, t):
             return events, t - NOW
     return [], seconds
 
@@ -64,7 +70,7 @@ def test_he_is_back_there_with_his_name(tracks: Tracks, prints: np.ndarray) -> N
     assert (label.id, label.kind, label.since, label.stale) == (5, "mover", 20.0, False)
     assert tracks.bodies["own"][0] == 7.0
     assert prints["owner"][0] == 0
-    assert tracks.absent.gone(1e6) == []
+    assert tracks.absent.gone(1e6) == tracks.awaited(NOW) == []
 
 
 def test_who_shows_no_other_foot_is_lost_again(tracks: Tracks, prints: np.ndarray) -> None:

@@ -32,7 +32,7 @@ _POOL = 256
 _BEGAN_M = 0.1
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
 OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
-NAMED = ("label", "first", *OWN, "told_x", "told_y", "told_at")
+NAMED = ("label", "first", *OWN, "told_x", "told_y")
 
 
 class Association:

@@ -108,7 +108,6 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.far = c.width
     body.ax, body.ay, body.a_seen, body.a_since, body.a_print = c.x, c.y, t, t, print_index
     body.bx, body.by, body.b_seen, body.b_since, body.b_print = c.x, c.y, -1e9, t, -1
-    body.told_at = -1e9
     # What is wide and begins right before the background is a piece of it that is moved.
     body.from_furniture = 1 if c.width > 0.28 and c.gap < 0.35 else 0
     body.clear = 0.0

@@ -69,7 +69,7 @@ def place(body: Any, t: float) -> tuple[float, float, float]:
 def tell(bodies: Any, index: int, t: float) -> tuple[int, float, float, float]:
     """(label, x m, y m, variance m²) of the mover ``index``, and remember that it is told at t."""
     body = bodies[index]
-    body.told_x, body.told_y, body.told_at = body.x, body.y, t
+    body.told_x, body.told_y = body.x, body.y
     x, y, variance = place(body, t)
     return body.label, x, y, variance
 

@@ -76,6 +76,11 @@ class Absent:
         return bool(somebody)
 
     @property
+    def bodies(self) -> list[Any]:
+        """Those who are waited for (`state.BODY`)."""
+        return [*self._bodies, *self._turning]
+
+    @property
     def waits(self) -> bool:
         """Whether anybody is waited for."""
         return bool(self._bodies)

@@ -34,6 +34,7 @@ from tms_agents.floor.movers.review import (
     review,
     unseen,
 )
+from tms_agents.floor.movers.told import Told
 from tms_agents.floor.movers.twice import began, suspect
 from tms_agents.floor.movers.whereabouts import Whereabouts
 from tms_agents.floor.robots.recognizing import may_be_robot
@@ -81,6 +82,7 @@ class Tracks:
         self.flickering = Flickering()
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
+        self._told = Told(self.bodies.size)
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
 
     @property
@@ -90,13 +92,15 @@ class Tracks:
 
     def save(self) -> dict[str, Any]:
         """JSON values, without those of the association."""
-        return {"absent": self.absent.save(), "strides": list(self.strides), "flickering": self.flickering.save()}
+        told = {"told": self._told.save(), "strides": list(self.strides)}
+        return {"absent": self.absent.save(), "flickering": self.flickering.save(), **told}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
         self.absent.restore(saved["absent"])
         self.flickering.restore(saved["flickering"])
         self.strides = [(float(t), float(x), float(y), float(matters)) for t, x, y, matters in saved["strides"]]
+        self._told.restore(saved["told"])
 
     def review(
         self,
@@ -121,10 +125,11 @@ class Tracks:
         self._believe_steps(t)
         self._association.rename(t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t) + self._gone_out(t)
-        for index, action in enumerate(self._actions.tolist()):
-            if action == NOTHING:
+        for index, body in enumerate(self.bodies):
+            action = int(self._actions[index])
+            if action == NOTHING or not body["used"]:
+                # Or it is somebody else's body by now.
                 continue
-            body = self.bodies[index]
             if action == FLICKERS:
                 self.flickering.found(body, t)
             if action in (THING, FLICKERS) or (action == PIECE and is_furniture(body)):
@@ -136,8 +141,7 @@ class Tracks:
                 events += self._lost(index, t)
             elif action == BACK:
                 body["stale"] = 0
-                label, xy, _ = self._tell(index, t)
-                events.append(Back(t, label, xy))
+                events.append(Back(t, *self._tell(index, t)))
             elif action == CONFIRM:
                 missing = missing_one(self.bodies, body, self._where, self.absent)
                 if not self._is_pushed(body, missing, legs):
@@ -149,11 +153,15 @@ class Tracks:
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             elif action in (MOVED, BROAD):
                 events.append(Moved(t, *self._tell(index, t)))
-        return events
+        return self._told.agree(events, self.bodies, self.absent.bodies, t)
 
     def labels(self, t: float) -> list[FloorLabel]:
-        """The movers there are."""
+        """The movers there are, but for those who are ``awaited``."""
         return [_label(body, t) for body in self.bodies if body["used"] and body["confirmed"]]
+
+    def awaited(self, t: float) -> list[FloorLabel]:
+        """Movers of whom nothing is seen and who have not left: where they were seen last."""
+        return [_label(body, t) for body in self.absent.bodies]
 
     def turns_up(self, prints: Any, i: int, t: float) -> list[FloorEvent]:
         """Who is waited for stands on the print i, it seems: then he is back."""
@@ -164,7 +172,7 @@ class Tracks:
         self.absent.found(old)
         self.bodies[index]["confirmed"] = 1
         self._go_on(index, old)
-        return [Back(t, *self._tell(index, t)[:2])]
+        return self._told.agree([Back(t, *self._tell(index, t))], self.bodies, self.absent.bodies, t)
 
     def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
         """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
@@ -221,6 +229,8 @@ class Tracks:
             self._association.forget(index)
             if not self.absent.keep(body):
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
+            elif not body["stale"]:
+                events.append(Stale(t, int(body["label"])))
         return events
 
     def _lost(self, index: int, t: float, *, thing: bool = False) -> list[FloorEvent]:
@@ -297,7 +307,7 @@ class Tracks:
             body["confirmed"], body["robot"] = 1, old["robot"]
             self._go_on(index, old)
             label, xy, cov = self._tell(index, t)
-            return [Back(t, label, xy)] if old["stale"] else [Moved(t, label, xy, cov)]
+            return [Back(t, label, xy, cov) if old["stale"] else Moved(t, label, xy, cov)]
         body["confirmed"], body["label"], body["robot"] = 1, new_label(), int(robot)
         self._association.named(index)
         hidden = (self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1) & (self.bodies["stale"] != 0)
