@@ -217,11 +217,11 @@ class FloorEstimator:
         waits = kind == OBJECT and not q["given"] and t - q["rested"] < waits_s and self._gates.distance(x, y) == 0.0
         if waits and not has_left(q, self._tracks.bodies):
             return []
-        started = min(view.background.seconds for view in self._views.values())
-        known = t - q["first"] > started - self._settings.learn_s
         if kind != OBJECT:
             q["revealed"] = LOOKS
             return []
+        started = min(view.background.seconds for view in self._views.values())
+        known = t - q["first"] > started - self._settings.learn_s
         # Who has stood there all the time was learned with the room, and shows an edge of himself when he shifts.
         edge = q["width"] < _EDGE_M or q["whole"] < 0.8 * q["hits"]
         sliver = (q["attached"] > 0.02 and edge) or (q["beams"] < 2.0 and not q["given"])
@@ -236,7 +236,10 @@ class FloorEstimator:
         if t - q["silent"] < _MUTE_S and self._dark_width(q) > _DARK_M:
             q["revealed"] = LOOKS
             return []
-        return self._objects.born(index, self._prints, self._tracks.bodies, self._new_label(), t)
+        born = self._objects.born(index, self._prints, self._tracks.bodies, self._new_label, t)
+        if born:
+            self._association.lift(index)
+        return born
 
     def _empty_until(self, q: Any, t: float) -> float:
         """When the place of the print was last seen to be empty; it came to rest there then, or unseen, later."""

@@ -13,6 +13,7 @@ from tms_agents.floor.association.hypotheses import Hypotheses, copy, exchange, 
 from tms_agents.floor.association.identity import unite
 from tms_agents.floor.association.proposing import next_best, no_ways, propose
 from tms_agents.floor.feet.bodies import predict
+from tms_agents.floor.feet.prints import lift
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.state import FEET
@@ -43,7 +44,7 @@ def advance(
     before, of, t = now.bodies, scan.of, scan.t
     kept_most, n, m = before.shape[0], before.shape[1], scan.clusters.size
     first, alike = np.empty((count, n), np.int64), np.empty((count, n), np.int64)
-    top = _compare(now, t, first, alike)
+    top = _compare(now, scan.prints, t, first, alike)
     ways = no_ways(scores[:count], m, top)
     parents, columns = ways.parent, ways.columns
     many = propose(now, alike, top, scan, ways)
@@ -97,8 +98,10 @@ def advance(
 
 
 @njit(cache=True)
-def _compare(now: Hypotheses, t: float, first: Integers, alike: Integers) -> int:
+def _compare(now: Hypotheses, prints: Any, t: float, first: Integers, alike: Integers) -> int:
     """Move everybody to the time t; how many of the bodies may be believed: those that are, are the first.
+
+    Nobody stands on what is no more in ``prints`` (p,).
 
     Fills in which hypothesis each body was exactly the same ``first`` (count, n), and in which ``alike`` (count, n): in
     all that has to do with whose foot a cluster is.
@@ -106,6 +109,7 @@ def _compare(now: Hypotheses, t: float, first: Integers, alike: Integers) -> int
     bodies, raw = now.bodies, now.raw
     top = 0
     for h in range(first.shape[0]):
+        lift(bodies[h], prints)
         predict(bodies[h], t)
         for b in range(bodies.shape[1]):
             if bodies[h, b].used:

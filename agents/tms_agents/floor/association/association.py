@@ -156,6 +156,12 @@ class Association:
         free = np.flatnonzero(~self.hypotheses["used"].any(axis=0))
         return int(free[0]) if free.size else -1
 
+    def lift(self, print_: int) -> None:
+        """Nobody stands on this print any more, whatever hypothesis holds."""
+        for foot in ("a_print", "b_print"):
+            on = self.hypotheses[foot]
+            on[on == print_] = -1
+
     def forget(self, index: int) -> None:
         """The mover at ``index`` has gone, whatever hypothesis holds."""
         self._now.bodies["used"][: self._count, index] = 0

@@ -238,6 +238,17 @@ def _hides_none(q: Any, other_seen: float, t: float) -> bool:
 
 
 @njit(cache=True)
+def lift(bodies: Any, prints: Any) -> None:
+    """Feet of ``bodies`` (n,) whose print is no more stand on none: in its place of ``prints`` another may begin."""
+    for b in range(bodies.size):
+        body = bodies[b]
+        if body.used and body.a_print >= 0 and not prints[body.a_print].used:
+            body.a_print = -1
+        if body.used and body.b_print >= 0 and not prints[body.b_print].used:
+            body.b_print = -1
+
+
+@njit(cache=True)
 def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoes: Array) -> None:
     """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy).
 
@@ -252,7 +263,7 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
         body.older, body.odd = 0.0, 0
         j = body.a_print if body.a_seen >= body.b_seen else body.b_print
         if body.used and j >= 0:
-            body.odd = unlike_foot(body, prints[j])
+            body.odd = UNLIKE if unlike_foot(body, prints[j]) else 0
             if prints[j].idle > _NOBODYS * (t - prints[j].rested):
                 body.older = prints[j].idle
             alone = t - prints[j].first > _ALONE_S and t - min(body.a_seen, body.b_seen) > _ALONE_S
@@ -260,10 +271,6 @@ def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoe
                 body.odd = UNLIKE
             if shod and _hides_none(prints[j], min(body.a_seen, body.b_seen), t):
                 body.odd = ALONE
-        if body.a_print >= 0 and not prints[body.a_print].used:
-            body.a_print = -1
-        if body.b_print >= 0 and not prints[body.b_print].used:
-            body.b_print = -1
     for j in range(prints.size):
         q = prints[j]
         if not q.used:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from tms_agents.floor.objects.visitors import Visitors
 from tms_agents.floor.robots.recognizing import has_robot
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, HIT, PAST, QUIET, SILENT
 from tms_agents.floor.settings import FloorSettings
-from tms_agents.floor.state import pack, unpack
+from tms_agents.floor.state import free_slot, pack, unpack
 
 Array = NDArray[np.float64]
 
@@ -177,14 +178,15 @@ class Objects:
                 self.waiting[j] = float(prints[j]["rested"]), candidates(near_movers(bodies, prints[j]))
         return [(j, kind) for j, kind in found if kind != WAITS]
 
-    def born(self, index: int, prints: Any, bodies: Any, label: int, t: float) -> list[FloorEvent]:
-        """The print ``index`` is an object."""
+    def born(self, index: int, prints: Any, bodies: Any, new_label: Callable[[], int], t: float) -> list[FloorEvent]:
+        """The print ``index`` is an object; nothing, where there is no room for one."""
         print_ = prints[index]
-        print_["used"] = 0
-        slot = int(self.things["used"].argmin())
-        thing = self.things[slot]
-        if thing["used"]:
+        slot = free_slot(self.things)
+        if slot < 0:
             return []
+        print_["used"] = 0
+        thing = self.things[slot]
+        label = new_label()
         thing["used"], thing["label"] = 1, label
         self.visitors.forget(slot)
         thing["x"], thing["y"], thing["half"] = print_["x"], print_["y"], 0.5 * print_["width"]

@@ -281,10 +281,11 @@ def claim(
     The first cluster that has turned out to be furniture ends it, which is told; else it is how many there are.
     """
     for k in range(start, clusters.size):
-        c, q = clusters[k], prints[of[k]]
-        if q.revealed:
+        c, j = clusters[k], of[k]
+        if j >= 0 and prints[j].revealed:
             return k
-        if somebodys[k] or (q.hits >= 3 and q.hits > 0.6 * q.looks):
+        # Without room for a print it may be anything.
+        if somebodys[k] or j < 0 or (prints[j].hits >= 3 and prints[j].hits > 0.6 * prints[j].looks):
             claimed[c.first : c.last + 1] = True
     return int(clusters.size)
 

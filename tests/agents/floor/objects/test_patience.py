@@ -108,7 +108,7 @@ def test_who_was_there_when_it_came_has_put_it_there_however_late_it_is_told() -
     bodies["x"] = [3.0, 0.7]
     prints["last"] = NOW + 20.0
     assert objects.ripe(prints, bodies, NOW + 20.0, expected()) == [(0, OBJECT)]
-    (told,) = objects.born(0, prints, bodies, 5, NOW + 20.0)
+    (told,) = objects.born(0, prints, bodies, lambda: 5, NOW + 20.0)
     assert isinstance(told, Appeared)
     assert [mover for mover, _ in told.candidates] == [3]
     assert objects.waiting == {}

@@ -95,7 +95,7 @@ def test_what_is_hidden_is_not_learned_as_a_part_of_the_wall_until_it_is_seen_ag
 
 def test_a_thing_that_is_told_while_it_is_hidden_was_seen_before() -> None:
     prints, objects = resting(4.0, last=NOW - 1.0, x=1.0), Objects(empty(THING, 1), FloorSettings())
-    told = objects.born(0, prints, empty(BODY, 1), 7, NOW)
+    told = objects.born(0, prints, empty(BODY, 1), lambda: 7, NOW)
     assert [(event.label, event.t, event.since) for event in told if isinstance(event, Appeared)] == [
         (7, NOW, NOW - 4.0)
     ]
