@@ -352,6 +352,9 @@ class Background:
             self.weight,
             self.empty,
             self.missing,
+            self.times,
+            self.seen_at,
+            self.seconds,
         )
 
     # --- across restarts

@@ -23,20 +23,28 @@ def adopt(
     weight: Array,
     empty: Array,
     missing: Array,
+    times: Array,
+    seen_at: Array,
+    seconds: float,
 ) -> None:
-    """Make ``ranges`` (m,) m, seen now, the background of ``beams`` (m,) with the weight ``share``, in place."""
+    """Make ``ranges`` (m,) m, seen now, the background of ``beams`` (m,) with the weight ``share``, in place.
+
+    A component that is there already weighs so much at least; else the one that weighs least is replaced.
+    """
     for b in range(beams.size):
         i, r = beams[b], ranges[b]
-        target = 0
+        target, known = 0, False
         for j in range(centre.shape[1]):
             if weight[i, j] > 0.0 and abs(r - centre[i, j]) < threshold:
-                target = j
+                target, known = j, True
                 break
             if weight[i, j] < weight[i, target]:
                 target = j
         missing[i, target] = 0.0
-        if weight[i, target] >= share:
+        if known and weight[i, target] >= share:
             continue
+        if not known:
+            times[i, target], seen_at[i, target] = 1.0, seconds
         for j in range(centre.shape[1]):
             weight[i, j] *= 1.0 - share
         empty[i] *= 1.0 - share

@@ -117,6 +117,19 @@ def test_furniture_is_adopted_at_once(learned: Background) -> None:
     assert (learned.classify(scan) == BACKGROUND).all()
 
 
+def test_what_is_adopted_is_new_whatever_it_replaces() -> None:
+    """Beams that see four surfaces in turn: another one begins, and those that had gone are gone as before."""
+    background = Background(30, math.radians(0.5), FloorSettings())
+    for r in (2.0, 3.0, 4.0, 5.0):
+        learn(background, np.full(30, r), 6.0)
+    background.adopt(np.arange(30), np.full(30, 2.5), 0.1)
+    assert (background.classify(np.full(30, 2.5)) == BACKGROUND).all()
+    here = np.abs(background.centre - 2.5) < 1e-9
+    assert here.any(axis=1).all()
+    assert (background.times[here] == 1.0).all() and (background.seen_at[here] == background.seconds).all()
+    assert ((background.missing > 0.0) == (background.centre < 4.5) & ~here).all(), "all but the last had gone"
+
+
 def test_what_has_gone_comes_back_whole_and_anything_less_is_something_new() -> None:
     """A cupboard, ten beams wide, was moved away a while ago; a small thing lies where its front was."""
     cupboard = np.full(30, 4.0)
