@@ -11,7 +11,6 @@ from floor_scores_objects import ObjectScores
 
 #: (scene, feet, contestant) -> scores of each seed.
 Table = Mapping[tuple[str, str, str], Sequence[Scores]]
-SIZES = (0.03, 0.05, 0.08, 0.15)
 #: Long enough to tell a thing from somebody who stands there or a robot behind him.
 CLEAR_S = 20.0
 

@@ -119,7 +119,7 @@ def _take(body: Any, a: int, b: int, scan: ClusteredScan, sight: Sight) -> None:
     clusters, of, marks, t = scan.clusters, scan.of, scan.marks, scan.t
     for i in (a, b):
         if i >= 0 and not clusters[i].cut:
-            learn(body, marks[i, 0], marks[i, 1])
+            learn(body, marks[i, 0])
     one = clusters[a] if a >= 0 else scan.blank[0]
     two = clusters[b] if b >= 0 else scan.blank[0]
     leaves = (a < 0) != (b < 0) and out_of_reach(body, clusters[max(a, b)], t, sight)

@@ -36,7 +36,6 @@ class Registration:
     pose: Pose
     rmse_m: float
     places: int
-    way_m: float
     offset_s: float
 
 
@@ -97,7 +96,7 @@ def _finished(
     if spread[1] < 0.3:
         raise ValueError("nobody walked far enough before both lasers: half a metre says little of directions")
     pose = (float(move[0]), float(move[1]), wrapped(move[2]))
-    return Registration(pose, rmse, places, float(4 * spread[1]), offset)
+    return Registration(pose, rmse, places, offset)
 
 
 def _worth(found: tuple[int, float, float, NDArray[np.float64]]) -> float:

@@ -113,7 +113,7 @@ def unlike(body: Any, mark: Array) -> float:
 
 
 @njit(cache=True)
-def learn(body: Any, value: float, variance: float) -> None:
+def learn(body: Any, value: float) -> None:
     """The body was seen with this brightness."""
     if np.isnan(value):
         return

@@ -110,7 +110,7 @@ class Doors:
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
         edges = saved["edges"]
-        unseen_m = [float(one) for one in saved.get("unseen_m", ())]
+        unseen_m = [float(one) for one in saved["unseen_m"]]
         if len(unseen_m) == len(self.unseen_m):
             self.unseen_m = unseen_m
         self._edges = unpack(edges, np.zeros((int(edges["shape"][0]), 4)))

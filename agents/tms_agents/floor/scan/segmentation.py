@@ -163,7 +163,7 @@ def _segment(
         ay = rays[a, o + 1] + ranges[a] * rays[a, o + 3]
         bx = rays[b, o] + ranges[b] * rays[b, o + 2]
         by = rays[b, o + 1] + ranges[b] * rays[b, o + 3]
-        c.spacing = c.near * step[min(a, n - 1)]
+        c.spacing = c.near * step[a]
         c.width = norm(ax - bx, ay - by) + c.spacing
         _lies(c, bx - ax, by - ay, rays[(a + b) // 2, o + 2], rays[(a + b) // 2, o + 3])
         c.attached = 0

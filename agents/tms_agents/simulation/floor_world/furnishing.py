@@ -110,7 +110,7 @@ def _pieces(plan: Plan, mounts: list[Mount], setting: Setting, rng: np.random.Ge
         if setting.divider and name in ("table", "cabinet2"):
             continue
         for _ in range(60):
-            pose = _pose(plan, width, depth, at_wall, rng)
+            pose = _pose(plan, depth, at_wall, rng)
             material = _DARK if kind == "box" and rng.random() < 0.15 else Material(rng.uniform(0.3, 0.8))
             piece = Furniture(
                 id=name, kind="legs" if kind == "legs" else "box", width=width, depth=depth, pose=pose,
@@ -124,7 +124,7 @@ def _pieces(plan: Plan, mounts: list[Mount], setting: Setting, rng: np.random.Ge
     return placed
 
 
-def _pose(plan: Plan, width: float, depth: float, at_wall: bool, rng: np.random.Generator) -> Pose:
+def _pose(plan: Plan, depth: float, at_wall: bool, rng: np.random.Generator) -> Pose:
     if not at_wall:
         return (rng.uniform(1, plan.width - 1), rng.uniform(0.9, plan.depth - 0.9), rng.uniform(-0.3, 0.3))
     gap = depth / 2 + rng.uniform(0.01, 0.05)

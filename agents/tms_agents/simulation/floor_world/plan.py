@@ -13,8 +13,6 @@ from scipy.sparse.csgraph import dijkstra
 from tms_agents.simulation.floor_world.room import Furniture, Wall
 from tms_agents.simulation.floor_world.shapes import Bools, Floats, Xy, to_box
 
-Rectangle = tuple[float, float, float, float]  # x0 y0 x1 y1
-
 _CELL = 0.08
 #: Depth of the corridor outside each door.
 CORRIDOR = 1.5
@@ -37,7 +35,6 @@ class Plan:
     depth: float
     niche: Xy  # of the north-east corner, (0, 0) for none
     doors: tuple[Door, ...]
-    mirror: tuple[Xy, Xy] | None = None  # on the south or west wall
     inner: tuple[Wall, ...] = field(default=())
 
     def outline(self, margin: float = 0.0) -> list[Xy]:

@@ -116,14 +116,6 @@ class Drawing:
                 velocity,
             )
 
-    def extend(self, other: Drawing) -> None:
-        self._segments += other._segments
-        self._segment_owner += other._segment_owner
-        self._segment_material += other._segment_material
-        self._circles += other._circles
-        self._circle_owner += other._circle_owner
-        self._circle_material += other._circle_material
-
     def shapes(self) -> Shapes:
         return Shapes(
             np.array(self._segments, dtype=np.float64).reshape(-1, 6),

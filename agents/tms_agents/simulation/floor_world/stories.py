@@ -123,37 +123,35 @@ def new_thing(
     name: str,
     material: Material | None = None,
     where: Literal["open", "wall"] = "open",
-    near: Xy | None = None,
-    laser: str | None = None,
 ) -> Thing:
     """A thing at a place that a laser can see now: on the open floor, or less than 10 cm before a wall.
 
     On the open floor, too, where no wall has such a place. Raises RuntimeError where there is none at all.
     """
     shape: Literal["disc", "box"] = "disc" if life.rng.random() < 0.5 or size < 0.05 else "box"
-    for attempt in range(4000):
+    for _ in range(4000):
         xy = _by_the_wall(life, size) if where == "wall" else life.random_place(0.35)
-        if xy is None or (near is not None and math.dist(xy, near) > 1.0 + attempt / 500):
+        if xy is None:
             continue
         if all(math.dist(xy, thing.pose[:2]) > 0.45 for thing in life.room.things.values()) and all(
             math.dist(xy, mover.xy) > 0.5 for mover in life.movers.values()
         ):
             pose = (*xy, life.rng.uniform(-math.pi, math.pi))
             thing = Thing(id=name, size=size, shape=shape, pose=pose, material=material or _plain(life.rng))
-            if would_see(life, thing, laser):
+            if would_see(life, thing):
                 return thing
     if where == "wall":
-        return new_thing(life, size, name, material, "open", near, laser)
+        return new_thing(life, size, name, material)
     raise RuntimeError(f"no place for {name} in 4000 attempts")
 
 
-def would_see(life: Life, thing: Thing, laser: str | None = None) -> bool:
+def would_see(life: Life, thing: Thing) -> bool:
     """More than a beam and a half of a laser would meet the thing, were it there and nobody in the way."""
     for name, mount in life.room.mounts.items():
         distance = math.dist(mount.pose[:2], thing.pose[:2])
         width = thing.size if thing.shape == "disc" else 0.6 * thing.size
         large = width / distance > 1.6 * mount.laser.step and distance < 0.9 * mount.laser.range_max_m
-        if laser in (None, name) and large and life.room.in_view(name, thing.pose[:2], thing.size / 2 + 0.02):
+        if large and life.room.in_view(name, thing.pose[:2], thing.size / 2 + 0.02):
             return True
     return False
 

@@ -13,13 +13,11 @@ from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
 
-VARIANCE = 0.01
-
 
 def walk(body, brightness: float, stance_s: float, scans: int = 200) -> None:
     """Seen for so many scans; a stance in ten."""
     for scan in range(scans):
-        learn(body, brightness, VARIANCE)
+        learn(body, brightness)
         if scan % 10 == 0:
             beat(body, stance_s, 0.5)
 

@@ -30,7 +30,7 @@ def people(*brightness: float):
         body["used"] = body["confirmed"] = 1
         body["seen"] = body["sure"] = 1.0
         for _ in range(400):
-            learn(body, value, VARIANCE)
+            learn(body, value)
     return bodies
 
 
@@ -55,7 +55,7 @@ def test_what_is_known_of_a_name_that_is_unsure_stays() -> None:
     (body,) = people(7.0)
     body["sure"] = 0.3
     for _ in range(80):
-        learn(body, 6.3, VARIANCE)
+        learn(body, 6.3)
     assert body["own"] == pytest.approx(7.0)
     assert body["look"] < 6.7
 
@@ -71,7 +71,7 @@ def watched(deviation: float, beside: float = 3.0) -> np.ndarray:
         t = 0.1 * scan
         bodies["seen"] = t
         marks = np.array([[7.0 + deviation * random.normal(), learned[0] * VARIANCE, 0.0, 0.5]])
-        learn(bodies[0], *marks[0, :2])
+        learn(bodies[0], marks[0, 0])
         scatter(bodies, clusters, np.array([0]), marks, t, learned)
     return learned
 
