@@ -14,6 +14,7 @@ from tms_agents.floor.feet.likelihood import too_wide
 from tms_agents.floor.feet.missing import expect, missed, out_of_reach
 from tms_agents.floor.feet.nobodys import costs
 from tms_agents.floor.feet.one_foot import UNLIKELY
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.shine import learn
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.clustered import ClusteredScan
@@ -204,7 +205,7 @@ def _pushed(c: Any, bodies: Any, t: float) -> bool:
     """Whether what begins is too wide for a foot and a person stands beside it."""
     for b in range(bodies.size):
         body = bodies[b]
-        person = body.used and body.confirmed and not body.robot and t - body.seen < 0.5
+        person = is_person(body) and t - body.seen < 0.5
         near = person and norm(body.x - c.x, body.y - c.y) < 0.7 + 0.5 * c.width
         if near and (c.width > _BROAD_M or (c.width > _BROAD_LEGS_M and too_wide(body, c) > 0.0)):
             return True

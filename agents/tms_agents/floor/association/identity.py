@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.association.assignment import assign
 from tms_agents.floor.feet.build import LEGS_KNOWN, SHOES, SHOES_KNOWN
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
@@ -127,7 +128,7 @@ def christen(bodies: Any, belief: Array, index: int, x: float, y: float) -> None
     here = bodies[index]
     for b in range(bodies.size):
         one = bodies[b]
-        if b == index or not one.used or not one.confirmed or one.robot:
+        if b == index or not is_person(one):
             continue
         if min(norm(one.x - x, one.y - y), norm(one.x - here.x0, one.y - here.y0)) < _BESIDE_M:
             belief[index, b], belief[b, index] = _CONFUSED, _CONFUSED * belief[b, b]
@@ -141,7 +142,7 @@ def renamed(bodies: Any, belief: Array, t: float, scattered: Array, names: NDArr
     for b in range(bodies.size):
         names[b] = b
         body = bodies[b]
-        if body.used and body.confirmed and not body.robot and t - body.seen < 1.0:
+        if is_person(body) and t - body.seen < 1.0:
             rows[n] = b
             n += 1
     if n < 2:

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 
 #: Of such a share of wide feet somebody's shoes are seen, not legs; so wide (m) is a shoe from its side.
@@ -140,7 +141,7 @@ def count_shoes(bodies: Any, clusters: Any, of: NDArray[np.int64], t: float, sho
     """
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or body.seen < t or norm(body.vx, body.vy) < WALKS:
+        if not is_person(body) or body.seen < t or norm(body.vx, body.vy) < WALKS:
             continue
         for i in range(clusters.size):
             c = clusters[i]

@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.bodies import begin
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.shine import strangeness
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.segmentation import CLUSTER
@@ -93,7 +94,7 @@ def _take_back(bodies: Any, prints: Any, t: float, scattered: Array, scratch: An
     count = 0
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot:
+        if not is_person(body):
             continue
         for i in range(prints.size):
             p = prints[i]

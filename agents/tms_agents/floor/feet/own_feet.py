@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.gait import swap
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.shine import ALIKE, STRANGE, alike, strangeness
 from tms_agents.floor.feet.strays import nobodys, take
 from tms_agents.floor.norm import norm
@@ -48,7 +49,7 @@ def exchange(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
     count = 0
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or body.stale or body.wide > 0.6:
+        if not is_person(body) or body.stale or body.wide > 0.6:
             continue
         for _ in range(2):
             swap(body)
@@ -88,7 +89,7 @@ def may_be_his(q: Any, prints: Any, bodies: Any, t: float, scattered: Array) -> 
     """Whether the print is as bright as the feet of somebody beside it, who does not show two such feet elsewhere."""
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or not alike(body, q, scattered):
+        if not is_person(body) or not alike(body, q, scattered):
             continue
         feet, near = 0, norm(body.x - q.x, body.y - q.y) < _BODY_M
         for j, seen in ((body.a_print, body.a_seen), (body.b_print, body.b_seen)):

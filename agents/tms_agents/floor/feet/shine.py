@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.build import SURE, joined
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
@@ -134,7 +135,7 @@ def scatter(bodies: Any, clusters: Any, of: NDArray[np.int64], marks: Array, t: 
     """
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or body.seen < t or body.shine_n < _MEMORY:
+        if not is_person(body) or body.seen < t or body.shine_n < _MEMORY:
             continue
         alone = body.sure >= SURE
         for o in range(bodies.size):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.feet.build import SHOD, SHOES
 from tms_agents.floor.feet.gait import swap
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.prints import unlike_foot
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.freespace import FREE, Sight, clear
@@ -117,7 +118,7 @@ def release(bodies: Any, prints: Any, t: float, shoes: Array, sight: Sight) -> i
     count = 0
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot or body.stale or body.wide > 0.6:
+        if not is_person(body) or body.stale or body.wide > 0.6:
             continue
         stray = _stray(body, prints, t, shod, sight)
         if stray == 0:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.feet.bodies import misled
 from tms_agents.floor.feet.build import SHOES
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.movers.flickering import flickers, note_stay
 from tms_agents.floor.movers.lone import count_lone, has_come, has_walked
 from tms_agents.floor.movers.pair import is_pair
@@ -80,7 +81,7 @@ def _is_put(bodies: Any, b: int, t: float) -> bool:
         return False
     for o in range(bodies.size):
         other = bodies[o]
-        person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < _PUT_S
+        person = o != b and is_person(other) and t - other.seen < _PUT_S
         if person and norm(other.x - body.x0, other.y - body.y0) < _PUT_M:
             return True
     return False
@@ -151,7 +152,7 @@ def _accompanied(bodies: Any, b: int, t: float) -> bool:
     """Whether a person is so near something wide that it may be pushed."""
     for o in range(bodies.size):
         other = bodies[o]
-        person = o != b and other.used and other.confirmed and not other.robot and t - other.seen < 0.5
+        person = o != b and is_person(other) and t - other.seen < 0.5
         if person and norm(other.x - bodies[b].x, other.y - bodies[b].y) < 0.6 + 0.5 * bodies[b].far:
             return True
     return False

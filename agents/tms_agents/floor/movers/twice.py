@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 
 #: So far (m) from where somebody or a foot of his is one may begin who was he, and farther, this fast (m/s), the longer
@@ -27,7 +28,7 @@ def suspect(bodies: Any, index: int, t: float) -> None:
     new = bodies[index]
     for b in range(bodies.size):
         body = bodies[b]
-        if b == index or not body.used or not body.confirmed or body.robot or body.stale or t - body.seen > _THERE_S:
+        if b == index or not is_person(body) or body.stale or t - body.seen > _THERE_S:
             continue
         if t - landed(body) > _STANDS_S:
             continue

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.left_feet import has_left
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.prints import HARDLY
 from tms_agents.floor.feet.shine import strangeness
 from tms_agents.floor.norm import norm
@@ -56,7 +57,7 @@ def _may_be_foot(q: Any, bodies: Any, scattered: NDArray[np.float64]) -> bool:
     """Whether somebody is so near the print that he may stand on it, or it is as bright as his feet."""
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.stale or body.robot:
+        if not is_person(body) or body.stale:
             continue
         away = norm(body.x - q.x, body.y - q.y)
         if away < _UNDER_M or (away < _BESIDE_M and strangeness(body, q, scattered) < _LIKE):
@@ -81,7 +82,7 @@ def brings(q: Any, bodies: Any) -> bool:
         return True
     for b in range(bodies.size):
         body = bodies[b]
-        came = body.used and body.confirmed and not body.robot and abs(body.first - q.rested) < _BRINGS_S
+        came = is_person(body) and abs(body.first - q.rested) < _BRINGS_S
         if came and norm(body.x0 - q.x, body.y0 - q.y) < _BRINGS_M:
             return True
     return False

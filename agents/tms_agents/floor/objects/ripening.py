@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.own_feet import may_be_his
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.prints import HARDLY, lay_before
 from tms_agents.floor.norm import norm
 from tms_agents.floor.objects.patience import SPARE_S, patience
@@ -123,7 +124,7 @@ def joins(prints: Any, bodies: Any, t: float) -> bool:
     """Whether one of the prints seen now is a part of the room, or close to it, while a person is there."""
     there = False
     for b in range(bodies.size):
-        there = there or (bodies[b].used and bodies[b].confirmed and not bodies[b].robot)
+        there = there or is_person(bodies[b])
     if there:
         for j in range(prints.size):
             q = prints[j]

@@ -9,8 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.outline import ALL, HIDDEN, ON, fit, quality, share_of
+from tms_agents.floor.scan.segmentation import keep
 
 Array = NDArray[np.float64]
 
@@ -89,7 +91,7 @@ def accompany(q: Any, bodies: Any, t: float, dt: float) -> None:
     beside = False
     for b in range(bodies.size):
         body = bodies[b]
-        person = body.used and body.confirmed and not body.robot and body.wide < _WIDE and t - body.seen < _LATE_S
+        person = is_person(body) and body.wide < _WIDE and t - body.seen < _LATE_S
         beside = beside or (person and norm(body.x - q.x, body.y - q.y) < _PUSHES_M + q.a)
     q.pushed += _BESIDE * ((1.0 if beside else 0.0) - q.pushed)
     q.alone = 0.0 if beside else q.alone + dt * norm(q.vx, q.vy)
@@ -107,9 +109,7 @@ def take(q: Any, clusters: Any, ranges: Array, rays: Array, pose: Array, claimed
         if near and share_of(c, at, q.a, q.b, ranges, rays, pose) >= _ITS:
             claimed[c.first : c.last + 1] = True
             continue
-        if kept != k:
-            clusters[kept] = c
-        kept += 1
+        kept = keep(clusters, kept, k)
     return kept
 
 

@@ -8,7 +8,9 @@ from typing import Any
 
 from numba import njit
 
+from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
+from tms_agents.floor.scan.segmentation import keep
 
 #: Sure after so many sightings, such a way (m), and with so few people beside it (share of the way).
 _HITS, _WAY_M, _ALONE = 15, 1.0, 0.4
@@ -58,7 +60,7 @@ def _foot(c: Any, bodies: Any, t: float) -> bool:
     """Whether the foot of a person was just where the cluster is."""
     for b in range(bodies.size):
         body = bodies[b]
-        if not body.used or not body.confirmed or body.robot:
+        if not is_person(body):
             continue
         a_near = t - body.a_seen < _FOOT_S and norm(c.x - body.ax, c.y - body.ay) < _FOOT_M
         if a_near or (t - body.b_seen < _FOOT_S and norm(c.x - body.bx, c.y - body.by) < _FOOT_M):
@@ -92,14 +94,12 @@ def gather(clusters: Any, bodies: Any, most: float, t: float) -> int:
                 w.first, w.last = min(w.first, c.first), max(w.last, c.last)
                 w.cut, w.attached = 1, 0
                 continue
-            if kept != k:
-                clusters[kept] = c
             if part:
                 whole = kept
                 if c.width < 0.7 * body.far:
-                    clusters[kept].cut = 1
-                clusters[kept].attached = 0
-            kept += 1
+                    c.cut = 1
+                c.attached = 0
+            kept = keep(clusters, kept, k)
         m = kept
     return m
 

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.norm import norm
+from tms_agents.floor.scan.segmentation import keep
 from tms_agents.floor.settings import Polygon
 
 Array = NDArray[np.float64]
@@ -94,9 +95,7 @@ def _wanted(
         good = outside <= margin or (outside <= 2.0 * margin and _among(gates, gate_sizes, c.x, c.y))
         good = good and not _among(masks, mask_sizes, c.x, c.y)
         if good:
-            if kept != k:
-                clusters[kept] = c
-            kept += 1
+            kept = keep(clusters, kept, k)
     return kept
 
 

@@ -221,11 +221,8 @@ def _without_shreds(ranges: Array, clusters: Any) -> int:
                 o += way
     kept = 0
     for k in range(m):
-        if shred[k]:
-            continue
-        if kept != k:
-            clusters[kept] = clusters[k]
-        kept += 1
+        if not shred[k]:
+            kept = keep(clusters, kept, k)
     return kept
 
 
@@ -255,12 +252,9 @@ def _once(clusters: Any) -> int:
                 reach = _SAME_M + _SAME * max(c.width, p.width)
                 if p.mirror < 0 and norm(c.x - p.x, c.y - p.y) < reach:
                     twice = True
-        if twice:
-            # Otherwise one thing would be taken for two feet at one place.
-            continue
-        if kept != k:
-            clusters[kept] = c
-        kept += 1
+        # Else one thing would be taken for two feet at one place.
+        if not twice:
+            kept = keep(clusters, kept, k)
     return kept
 
 
@@ -273,10 +267,16 @@ def backed(clusters: Any) -> int:
     kept = 0
     for k in range(clusters.size):
         if clusters[k].n > _SPECK or np.isfinite(clusters[k].gap):
-            if kept != k:
-                clusters[kept] = clusters[k]
-            kept += 1
+            kept = keep(clusters, kept, k)
     return kept
+
+
+@njit(cache=True)
+def keep(clusters: Any, kept: int, k: int) -> int:
+    """Move the cluster k after the first ``kept`` of ``clusters`` (m,), which count: how many do now."""
+    if kept != k:
+        clusters[kept] = clusters[k]
+    return kept + 1
 
 
 class Segmenter:
