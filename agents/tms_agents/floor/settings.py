@@ -59,7 +59,8 @@ class Scene:
 class FloorSettings:
     """How careful the estimator is; the defaults suit a room of some metres and scans at 7 to 40 Hz.
 
-    Whether legs are seen or, some millimetres above the floor, shoes while they stand, it learns from everybody's feet.
+    Nothing is set for the height of the laser: whether it sees legs, or shoes only while they stand, is learned from
+    everybody's feet.
     """
 
     #: Background: how long it is only learned, from when on something may be called foreground, and how it forgets.

@@ -8,246 +8,220 @@ from typing import Any
 import numpy as np
 
 #: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
-#: (x, y) m mean of where it was seen, first time seen since it was hidden, since when it has rested there, hidden or
-#: not, last time seen, hits, looks and mutes (scans since that hit it, that could have, that saw nothing at all there;
-#: of those that hit it, that saw all of it, and only what something new before it left), width m, spread m (mean
-#: distance from the mean), attached (in which share of the last twenty sightings or so it was joined to the
-#: background), owner (index of the body whose foot it is, -1: nobody's), whose (label of the last one, until owned),
-#: busy (when a body was last near),
-#: spare (s for which somebody beside it has shown two other feet), idle (s for which it was seen as nobody's foot),
-#: alone (s for which it was all that was seen of its owner), silent and hidden (when nothing at all came back from
-#: there, though something should, and when something new stood before it),
-#: revealed (`furniture.LOOKS`, `furniture.MOVED`), how bright it is (`shine.measure`) and of how many sightings,
-#: beams of the last sighting.
 PRINT = np.dtype(
     [
         ("used", "i8"),
-        ("x", "f8"),
+        ("x", "f8"),  # m, mean of where it was seen
         ("y", "f8"),
-        ("first", "f8"),
-        ("rested", "f8"),
-        ("last", "f8"),
-        ("hits", "i8"),
-        ("looks", "i8"),
-        ("mutes", "i8"),
-        ("whole", "i8"),
-        ("covered", "i8"),
-        ("width", "f8"),
-        ("spread", "f8"),
-        ("beams", "f8"),
-        ("near", "f8"),
-        ("spacing", "f8"),
-        ("attached", "f8"),
-        ("owner", "i8"),
-        ("whose", "i8"),
-        ("owned", "f8"),
-        ("busy", "f8"),
-        ("revealed", "i8"),
-        ("given", "i8"),
-        ("spare", "f8"),
-        ("idle", "f8"),
-        ("alone", "f8"),
-        ("silent", "f8"),
-        ("hidden", "f8"),
-        ("still_x", "f8"),
+        ("first", "f8"),  # s, when it was first seen since it was hidden
+        ("rested", "f8"),  # s, since when it has rested there, hidden or not
+        ("last", "f8"),  # s, when it was last seen
+        ("hits", "i8"),  # scans that hit it
+        ("looks", "i8"),  # scans that could have,
+        ("mutes", "i8"),  # scans to which nothing at all came back from there
+        ("whole", "i8"),  # of those that hit it: that saw all of it
+        ("covered", "i8"),  # of those that hit it: that saw what something new before it leaves of it
+        ("width", "f8"),  # m
+        ("spread", "f8"),  # m, mean distance from the mean
+        ("beams", "f8"),  # of a sighting, in the mean
+        ("near", "f8"),  # m, how far it is from the laser
+        ("spacing", "f8"),  # m, how far apart beams are there
+        ("attached", "f8"),  # share of the last twenty sightings in which it was joined to the background
+        ("owner", "i8"),  # body whose foot it is, -1: nobody's
+        ("whose", "i8"),  # label of the last one
+        ("owned", "f8"),  # s, until when
+        ("busy", "f8"),  # s, when a body was last near
+        ("revealed", "i8"),  # as a part of the room: `furniture.LOOKS`, `furniture.MOVED`
+        ("given", "i8"),  # 1: a hand has put it there
+        ("spare", "f8"),  # s for which somebody beside it has shown two other feet
+        ("idle", "f8"),  # s for which it was seen as nobody's foot
+        ("alone", "f8"),  # s for which it was all that was seen of its owner
+        ("silent", "f8"),  # s, when nothing came back from there, though something should
+        ("hidden", "f8"),  # s, when something new stood before it
+        ("still_x", "f8"),  # m, where it has not moved
         ("still_y", "f8"),
-        ("still", "f8"),
-        ("shine", "f8"),
-        ("shine_n", "i8"),
-        ("sensor", "i8"),
-        ("first_beam", "i8"),
-        ("last_beam", "i8"),
+        ("still", "f8"),  # s, since when
+        ("shine", "f8"),  # how bright it is (`shine.measure`)
+        ("shine_n", "i8"),  # of how many sightings
+        ("sensor", "i8"),  # of the last sighting: by which sensor
+        ("first_beam", "i8"),  # from which beam
+        ("last_beam", "i8"),  # to which
     ]
 )
 
 #: Of a body that is not seen (stale): it is hidden, or it has sat down.
 CONCEALED, SEATED = 1, 2
 
-#: A body that moves: position and velocity (m, m/s) with one covariance for both axes (pp, pv, vv), where it began, and
-#: two feet: where and when each was last seen and which print it stands on (-1: in the air or unknown). What tells
-#: people apart is there three times: of the body in the last seconds (shine), of the body since it was last in doubt
-#: who it is (look, pace, girth, sole), and of the one whose name it has (own, own_pace, own_girth, own_sole); sure is
-#: how likely that name is. Further: the number of its `FOOTPRINT` (0: none), for how long (s) and where it has stood on
-#: one foot alone (lone), for how long what it stands on had been nobody's before (older, s), where and since when it
-#: has stayed (rest), where, more widely, and for how long it was seen there (stay, s), broader and thinner than feet
-#: (stay_broad, stay_thin, s), how often feet landed there (stay_lands), how broad (m) the broader of what was seen of
-#: it last is (broadest), and how far apart beams are there (spacing), how wide the legs are (m, 0: unknown),
-#: whether what is seen of it is no foot, and why (odd, `prints.UNLIKE`), the line on which the shoe last seen from its
-#: side lay (ex, ey), and when (e_at), in how many scans both feet had been seen (both) when it was last found to be
-#: nowhere (doubted), until when it stays where it was put back (held, s), and when somebody began to be seen, far from
-#: every door, who may be who it was (suspected). Of one not believed yet: in how many scans it was seen (hits), could
-#: have been (looks), and was or should have been (due). First all that has to do with whose foot a cluster is.
+#: A body that moves, on two feet. What tells people apart is there three times: of the body in the last seconds
+#: (shine), of the body since it was last in doubt who it is (`_LATELY`), and of the one whose name it has (own). First
+#: all that has to do with whose foot a cluster is.
 _OF_FEET = [
     ("used", "i8"),
-    ("confirmed", "i8"),
+    ("confirmed", "i8"),  # 1: it is believed, a mover
     ("label", "i8"),
-    ("robot", "i8"),
-    ("machine", "i8"),
-    ("footprint", "i8"),
-    ("stale", "i8"),
-    ("x", "f8"),
+    ("robot", "i8"),  # 1: it is broad, or a machine: no person
+    ("machine", "i8"),  # 1: it has gone by itself, and is as broad as a robot
+    ("footprint", "i8"),  # number of its `FOOTPRINT`, 0: none
+    ("stale", "i8"),  # not seen: `CONCEALED`, `SEATED`
+    ("x", "f8"),  # m
     ("y", "f8"),
-    ("vx", "f8"),
+    ("vx", "f8"),  # m/s
     ("vy", "f8"),
-    ("pp", "f8"),
+    ("pp", "f8"),  # covariance of place and velocity, the same of both axes
     ("pv", "f8"),
     ("vv", "f8"),
-    ("at", "f8"),
-    ("first", "f8"),
-    ("seen", "f8"),
-    ("hits", "i8"),
-    ("looks", "i8"),
-    ("due", "i8"),
-    ("both", "i8"),
-    ("x0", "f8"),
+    ("at", "f8"),  # s, the time of all this
+    ("first", "f8"),  # s, when it was first seen
+    ("seen", "f8"),  # s, when it was last seen
+    ("hits", "i8"),  # scans in which it was seen
+    ("looks", "i8"),  # scans that were looked for its feet in
+    ("due", "i8"),  # scans in which it was or should have been seen, while it is not believed
+    ("both", "i8"),  # scans in which both feet were seen
+    ("x0", "f8"),  # m, where it began
     ("y0", "f8"),
-    ("width", "f8"),
-    ("wide", "f8"),
-    ("far", "f8"),
-    ("ax", "f8"),
+    ("width", "f8"),  # m, of what is seen of it, in the mean
+    ("wide", "f8"),  # share of late in which that was too wide for a foot
+    ("far", "f8"),  # m, the most it was
+    ("ax", "f8"),  # m, where the first foot was seen last
     ("ay", "f8"),
-    ("a_seen", "f8"),
-    ("a_since", "f8"),
-    ("a_print", "i8"),
-    ("bx", "f8"),
+    ("a_seen", "f8"),  # s, when that was
+    ("a_since", "f8"),  # s, since when its print is there
+    ("a_print", "i8"),  # on which print it stands, -1: in the air or unknown
+    ("bx", "f8"),  # the second foot, the same
     ("by", "f8"),
     ("b_seen", "f8"),
     ("b_since", "f8"),
     ("b_print", "i8"),
-    ("from_furniture", "i8"),
-    ("score", "f8"),
-    ("a_vx", "f8"),
+    ("from_furniture", "i8"),  # 1: it began as a piece of furniture, -1: it is none
+    ("score", "f8"),  # how much all sightings looked like feet (`bodies.footlike`)
+    ("a_vx", "f8"),  # m/s, of the foot that swings
     ("a_vy", "f8"),
     ("b_vx", "f8"),
     ("b_vy", "f8"),
-    ("stride", "f8"),
-    ("side", "f8"),
-    ("a_px", "f8"),
+    ("stride", "f8"),  # m, from foot to foot
+    ("side", "f8"),  # m, how far to the left of the first the second one is
+    ("a_px", "f8"),  # m, where the first foot stands, or stood last
     ("a_py", "f8"),
-    ("a_ox", "f8"),
+    ("a_ox", "f8"),  # m, where before that
     ("a_oy", "f8"),
-    ("a_land", "f8"),
-    ("a_stood", "f8"),
-    ("b_px", "f8"),
+    ("a_land", "f8"),  # s, when it landed
+    ("a_stood", "f8"),  # s, when it was last seen to stand
+    ("b_px", "f8"),  # the second foot, the same
     ("b_py", "f8"),
     ("b_ox", "f8"),
     ("b_oy", "f8"),
     ("b_land", "f8"),
     ("b_stood", "f8"),
-    ("a_late", "f8"),
-    ("b_late", "f8"),
-    ("shoe", "f8"),
-    ("leg", "f8"),
-    ("ex", "f8"),
+    ("a_late", "f8"),  # s into the sweep when the first foot was seen
+    ("b_late", "f8"),  # and the second foot
+    ("shoe", "f8"),  # share of late in which a foot was as wide as a shoe from its side
+    ("leg", "f8"),  # m, how wide a foot is while it walks, 0: unknown
+    ("ex", "f8"),  # direction in which the shoe last seen from its side lay
     ("ey", "f8"),
-    ("e_at", "f8"),
-    ("shine", "f8"),
-    ("shine_n", "i8"),
-    ("own", "f8"),
+    ("e_at", "f8"),  # s, when that was
+    ("shine", "f8"),  # how bright it is, in the last seconds
+    ("shine_n", "i8"),  # of how many sightings
+    ("own", "f8"),  # of the one whose name it has: how bright
     ("own_n", "i8"),
-    ("own_pace", "f8"),
+    ("own_pace", "f8"),  # how long a stance takes (s)
     ("own_pace_n", "i8"),
-    ("own_girth", "f8"),
+    ("own_girth", "f8"),  # how wide a leg is (m)
     ("own_girth_n", "i8"),
-    ("own_sole", "f8"),
+    ("own_sole", "f8"),  # how long a shoe (m)
     ("own_sole_n", "i8"),
-    ("doubted", "i8"),
-    ("held", "f8"),
+    ("doubted", "i8"),  # ``both`` when it was last found to be nowhere
+    ("held", "f8"),  # s, until when it stays where it was put back
 ]
 #: The same: what has nothing to do with whose foot a cluster is.
 _BESIDES = [
-    ("told_x", "f8"),
+    ("told_x", "f8"),  # m, where it was told last
     ("told_y", "f8"),
-    ("clear", "f8"),
-    ("lone", "f8"),
-    ("lone_x", "f8"),
+    ("clear", "f8"),  # s for which its place was seen without it
+    ("lone", "f8"),  # s for which it has stood on one foot alone
+    ("lone_x", "f8"),  # m, where
     ("lone_y", "f8"),
-    ("rest_x", "f8"),
+    ("rest_x", "f8"),  # m, where it has stayed
     ("rest_y", "f8"),
-    ("rest_at", "f8"),
-    ("pushed", "f8"),
-    ("stay_x", "f8"),
+    ("rest_at", "f8"),  # s, since when
+    ("pushed", "f8"),  # share of its way, of late, on which a person was beside it
+    ("stay_x", "f8"),  # m, where it has stayed more widely
     ("stay_y", "f8"),
-    ("stay", "f8"),
-    ("stay_broad", "f8"),
-    ("stay_thin", "f8"),
-    ("stay_lands", "f8"),
-    ("broadest", "f8"),
-    ("spacing", "f8"),
-    ("quality", "f8"),
-    ("single", "f8"),
-    ("still", "f8"),
-    ("older", "f8"),
-    ("odd", "i8"),
-    ("suspected", "f8"),
+    ("stay", "f8"),  # s for which it was seen there
+    ("stay_broad", "f8"),  # s of these in which it was broader than feet
+    ("stay_thin", "f8"),  # s of these in which it was thinner
+    ("stay_lands", "f8"),  # how often feet landed there
+    ("broadest", "f8"),  # m, the broader of what was seen of it last
+    ("spacing", "f8"),  # m, how far apart beams are there
+    ("quality", "f8"),  # how much what is seen of it looks like feet, of late
+    ("single", "f8"),  # s for which one thing is all that is seen of it
+    ("still", "f8"),  # s for which neither foot has moved
+    ("older", "f8"),  # s for which what it stands on had been nobody's before
+    ("odd", "i8"),  # why that is no foot of its: `prints.UNLIKE`, 0: it may be
+    ("suspected", "f8"),  # s, when somebody began, far from every door, who may be who it was
 ]
 #: And what was seen of it since it was last in doubt who it is: another doubt, another time.
 _LATELY = [
-    ("look", "f8"),
+    ("look", "f8"),  # how bright it is
     ("look_n", "i8"),
-    ("pace", "f8"),
+    ("pace", "f8"),  # how long a stance takes (s)
     ("pace_n", "i8"),
-    ("girth", "f8"),
+    ("girth", "f8"),  # how wide a leg is (m)
     ("girth_n", "i8"),
-    ("sole", "f8"),
+    ("sole", "f8"),  # how long a shoe (m)
     ("sole_n", "i8"),
-    ("sure", "f8"),
+    ("sure", "f8"),  # how likely its name is
 ]
 BODY = np.dtype([*_OF_FEET, *_BESIDES, *_LATELY])
 #: A body as integers, each field as long as one: so many of the first have to do with whose foot a cluster is, so many
 #: with anything but a doubt.
 FEET, CERTAIN = len(_OF_FEET), len(_OF_FEET) + len(_BESIDES)
 
-#: A robot of known size, or what may be one: whether it is (sure), which body it is (-1: none), where it is (m), its
-#: yaw and velocity (m/s), half its length and width (a, b, m), since when, when it was seen and when it was looked for
-#: last, in how many scans it was seen, where it began, for which share of its way a person was beside it (pushed), how
-#: far (m) it has gone since with nobody there (alone), how well it fits in the mean, 0 to 1, and whether it was going.
+#: A robot of known size, or what may be one.
 FOOTPRINT = np.dtype(
     [
         ("used", "i8"),
-        ("sure", "i8"),
-        ("body", "i8"),
-        ("x", "f8"),
+        ("sure", "i8"),  # 1: it is a robot, 0: it may be one
+        ("body", "i8"),  # which body it is, -1: none
+        ("x", "f8"),  # m, its middle
         ("y", "f8"),
-        ("yaw", "f8"),
-        ("vx", "f8"),
+        ("yaw", "f8"),  # rad
+        ("vx", "f8"),  # m/s
         ("vy", "f8"),
-        ("a", "f8"),
-        ("b", "f8"),
-        ("first", "f8"),
-        ("seen", "f8"),
-        ("at", "f8"),
-        ("hits", "i8"),
-        ("x0", "f8"),
+        ("a", "f8"),  # m, half its length
+        ("b", "f8"),  # m, half its width
+        ("first", "f8"),  # s, since when it is there
+        ("seen", "f8"),  # s, when it was seen last
+        ("at", "f8"),  # s, when it was looked for last
+        ("hits", "i8"),  # scans in which it was seen
+        ("x0", "f8"),  # m, where it began
         ("y0", "f8"),
-        ("pushed", "f8"),
-        ("alone", "f8"),
-        ("fits", "f8"),
-        ("going", "i8"),
+        ("pushed", "f8"),  # share of its way on which a person was beside it
+        ("alone", "f8"),  # m it has gone since with nobody there
+        ("fits", "f8"),  # how well it fits, in the mean, 0 to 1
+        ("going", "i8"),  # 1: it was going
     ]
 )
 
-#: An object: place (m) and its variance (m²), half its width, times, for how long its place was seen to be free, and
-#: how far aside of its middle (m, along the beams), by which sensor and how often, it is met while half hidden.
+#: An object.
 THING = np.dtype(
     [
         ("used", "i8"),
         ("label", "i8"),
-        ("x", "f8"),
+        ("x", "f8"),  # m, its middle
         ("y", "f8"),
-        ("var", "f8"),
-        ("half", "f8"),
-        ("since", "f8"),
-        ("seen", "f8"),
-        ("hits", "i8"),
-        ("free", "f8"),
-        ("free_at", "f8"),
-        ("doubt", "f8"),
-        ("rate", "f8"),
-        ("solid", "f8"),
-        ("part", "f8"),
-        ("part_by", "i8"),
-        ("part_hits", "i8"),
+        ("var", "f8"),  # m², of each axis
+        ("half", "f8"),  # m, half its width
+        ("since", "f8"),  # s, since when it lies there
+        ("seen", "f8"),  # s, when it was seen last
+        ("hits", "i8"),  # sightings of all of it
+        ("free", "f8"),  # s for which its place was seen to be free
+        ("free_at", "f8"),  # s, when it was last seen or seen past
+        ("doubt", "f8"),  # how sure it is (negative log likelihood) that it has gone
+        ("rate", "f8"),  # share of looks in which it echoes
+        ("solid", "f8"),  # share of looks in which nothing is seen through it
+        ("part", "f8"),  # m, how far aside of its middle it is met while half hidden
+        ("part_by", "i8"),  # by which sensor
+        ("part_hits", "i8"),  # how often
     ]
 )
 

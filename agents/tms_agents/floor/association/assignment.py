@@ -109,7 +109,7 @@ def solve(cost: Array, shared: int, most: float, of_row: Integers, w: Work) -> f
 
 @njit(cache=True)
 def at_least(cost: Array, row: int, barred: int, w: Work) -> float:
-    """How much more any assignment costs, after `solve`, in which ``row`` has none of the columns `reassign` bars."""
+    """After `solve`: what it costs more at least if ``row`` has neither the column ``barred`` nor the next."""
     return float(_cheapest(cost, w, row, barred)[1] - w.u[row])
 
 

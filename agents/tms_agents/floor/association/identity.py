@@ -34,7 +34,8 @@ _SOLE_M, _SOLES_M = 0.012, 0.003
 _SEEN, _WALKED = 40, 8
 #: Who is found again may be anybody who is so near (m), this much as likely.
 _BESIDE_M, _CONFUSED = 2.0, 0.7
-#: Names that never were in doubt may have been exchanged unnoticed; a smaller doubt is none; when they are given back.
+#: Two names may have been exchanged unnoticed with this probability at least; a smaller one is no doubt; they are given
+#: back when that is likelier by so much (log likelihood).
 _UNNOTICED, _DOUBT, _SURE = 0.1, 0.02, 1.5
 
 

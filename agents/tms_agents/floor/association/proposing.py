@@ -26,9 +26,9 @@ WORSE, BRANCH = 18.0, 10.0
 class Ways(NamedTuple):
     """Ways to go on, c at most, of as many hypotheses as h: `no_ways` makes it.
 
-    The ``score`` (c,) of each, its ``parent`` (c,), and the ``columns`` (c, m) of the clusters. Where ``moved`` (c,) is
-    a cluster, not -1, its parent's best way is in ``columns``: that cluster must not be who it is there, which costs
-    ``score`` at least, and `next_best` finds out what else it may be.
+    The ``score`` (c,) of each, its ``parent`` (c,), and the ``columns`` (c, m) of the clusters. A way is finished where
+    ``moved`` (c,) is -1. Else it is the cluster that must not be who it is in the parent's best way, which is in
+    ``columns`` as yet: ``score`` is a lower bound, and `next_best` solves it when its turn has come.
 
     Of the hypotheses: their ``scores`` (h,); in ``costs`` (h, ..) a table (m, 2k + m) each of what a cluster costs as
     whose foot, of so many ``people`` (h,); what the ``best`` (h,) way costs, and how that was ``solved``.

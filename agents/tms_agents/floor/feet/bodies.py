@@ -20,7 +20,7 @@ STAND_M, _FAST, LONGEST_M = 0.045, 2.0, 1.4
 _FOOT_M = 0.05
 #: Wider than two feet side by side (m): a robot or furniture.
 WIDE_M = 0.4
-#: A foot last seen so long ago (s) has left; so long ago (s) is just now.
+#: A foot counts as seen now if it was within this (s); two feet have just become one thing if they did within this (s).
 _SEEN_S, _JUST_S = 0.25, 1.5
 #: Of whom two feet were seen at once in this share of so many scans is no robot.
 _TWO_FEET, _PERSON_HITS = 0.2, 80
@@ -140,7 +140,7 @@ def misled(body: Any) -> bool:
 
 @njit(cache=True)
 def footlike(c: Any) -> float:
-    """How much the cluster alone speaks for a foot or a robot, 0 to 1."""
+    """How much the cluster alone speaks for a foot or a robot: up to 1; -0.2: too narrow, or joined to a wall."""
     if narrow(c) or c.attached:
         return -0.2
     if c.n == 1:
@@ -268,9 +268,9 @@ def _stride(body: Any, dx: float, dy: float, speed: float, sign: float) -> None:
 
 
 def stuck(body: Any, t: float) -> tuple[float, float, float] | None:
-    """Where and when (x, y, t) the other foot was last seen, if all that is seen of a person is one thing that stands.
+    """If all that is seen of a person is one thing that stands: (x m, y m, t s) of the last sighting of the other foot.
 
-    It may be what was put down, and the person has gone on.
+    The thing may have been put down there, and the person gone on from where the other foot was. Else None.
     """
     a, b = t - body["a_seen"] < _SEEN_S, t - body["b_seen"] < _SEEN_S
     if body["robot"] or body["stale"]:

@@ -1,9 +1,9 @@
 """The numbers that the costs of feet are made of (`likelihood`); those of legs are fitted to whose feet clusters are.
 
-Simulated people and furniture, an assignment of all feet before that is right, and of every scan near others all ways
-to tell whose the clusters are: the numbers make the right one likely (`benchmarks/floor_whose.py`, which fits them
-again). What a foot costs that is put down just anywhere is held: the fit would have who comes out from behind something
-be somebody new. Those of shoes are as they were set by hand, but for where one lands (`landing`).
+Fitted to simulated rooms with people and furniture in which every foot was assigned rightly up to the scan before: the
+numbers make the right assignment of a scan likely among all there are (`benchmarks/floor_whose.py` fits them again).
+Only what it costs that a foot is put down just anywhere is held, since with the fitted one somebody who comes out from
+behind something would be somebody new. The numbers of shoes were set by hand, but for where one lands (`landing`).
 """
 
 from __future__ import annotations

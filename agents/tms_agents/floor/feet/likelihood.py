@@ -42,8 +42,8 @@ _BESIDE_M, _STAYS_S = 0.2, 2.0
 _NARROWEST = 0.4
 #: What was his foot so long (s) ago may be again: something flickered beside it.
 _LATELY_S = 0.5
-#: A leg is so wide at most (m); one sighting errs by so much (m), and counts for so much at most: the next one errs
-#: alike.
+#: No leg is wider (m). How wide one looks errs by so much (m), and alike from scan to scan: the square of a deviation,
+#: in units of that, counts for so much at most.
 LEG_M, _GIRTH_M, _OTHER = 0.16, 0.02, 4.0
 #: Negative log likelihood of a foot wider than a leg although the other one is elsewhere: up to as wide as two legs
 #: side by side (m), and wider; or longer than a shoe.

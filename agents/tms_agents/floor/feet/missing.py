@@ -71,9 +71,9 @@ def expect(bodies: Any, t: float, sight: Sight) -> None:
 
 @njit(cache=True)
 def out_of_reach(body: Any, c: Any, t: float, sight: Sight) -> bool:
-    """Whether the cluster is a foot that somebody leaves behind who walks to where the laser does not reach.
+    """Whether the cluster is the rear foot of somebody who walks to where the laser does not reach.
 
-    Then where his other foot is tells, not that he waits for it.
+    Then the filter must not be drawn back to it.
     """
     speed = norm(body.vx, body.vy)
     if body.robot or speed < _LEAVES or t - min(body.a_seen, body.b_seen) > _SWINGS_S:

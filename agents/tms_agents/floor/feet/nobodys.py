@@ -19,10 +19,15 @@ from tms_agents.floor.scan.segmentation import BRIDGE
 
 Array = NDArray[np.float64]
 
-#: A cluster that is nobody's foot: somebody new, how much less of a thing put down, what is hardly a foot at all, the
-#: same, new, where hardly anything comes back, somebody new known already, and what has rested there as nobody's, the
-#: same too thin for a foot.
-_NOBODY, _THING, _CLUTTER, _SCANT, _TENTATIVE, _RESTS, _THIN = 11.0, 6.0, 4.0, 7.5, 5.0, 2.0, 0.4
+#: What it costs (negative log likelihood) that a cluster is nobody's foot who is known.
+#: It is a foot of somebody new, who begins with it; up to so much less the longer it has lain there.
+_NOBODY, _THING = 11.0, 6.0
+#: It is too narrow for a foot, or joined to the background; the same where so little comes back that it may be one.
+_CLUTTER, _SCANT = 4.0, 7.5
+#: It is a foot of somebody who is followed already, but not believed yet.
+_TENTATIVE = 5.0
+#: It has rested there and been nobody's; the same of what is too thin for a foot.
+_RESTS, _THIN = 2.0, 0.4
 #: Who has stood for so long (s), and would have stepped so lately (s) off what is still there, rather stands there.
 _STOOD_S, _STEPS_S = 3.0, 2.0
 #: A shoe that was nobody's just before (within s): less than somebody new, who is paid for once.

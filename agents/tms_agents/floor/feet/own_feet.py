@@ -40,11 +40,11 @@ def _own(body: Any, prints: Any, x: float, y: float, t: float, scattered: Array)
 
 @njit(cache=True)
 def exchange(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
-    """Give those of ``bodies`` (n,) that stand on a thing, or on one foot alone, their own foot among ``prints`` back.
+    """Give ``bodies`` (n,) their own foot back where what is taken for it is much brighter or darker than their feet.
 
-    The thing is much brighter or darker than the feet of the body ever were, the print beside it is not. If there is
-    none, his own foot is hidden: he stands on the other. ``scattered`` (3,) is what `shine.scatter` has learned. How
-    many there are.
+    It is exchanged for one of the ``prints`` beside it that looks like their feet; where there is none their own foot
+    is hidden, and they stand on the other alone. ``scattered`` (3,) is what `shine.scatter` has learned. How many
+    bodies have changed.
     """
     count = 0
     for b in range(bodies.size):

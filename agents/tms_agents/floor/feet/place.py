@@ -22,8 +22,9 @@ Array = NDArray[np.float64]
 
 #: Both feet stand, the one that landed later alone, the other one alone, none is seen.
 BOTH, LATER, EARLIER, NONE = 0, 1, 2, 3
-#: What is added to the place of the filter, by case, just now and so long (s) after the later foot has landed: so much
-#: of the step between the feet, of a second of its speed, of the way to that foot, and of the stride of that foot.
+#: What is added to the place of the filter. For each case, so much of each of four vectors: the step between the feet,
+#: the velocity (times 1 s), the way to the foot that landed later, and the last stride of that foot. The first number
+#: holds when that foot has just landed, the second so long (s) after; between them they change linearly.
 LONG_S = 0.9
 TERMS = np.array(
     [

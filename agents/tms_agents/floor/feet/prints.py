@@ -16,7 +16,8 @@ from tms_agents.floor.scan.silence import blank, silent
 
 Array = NDArray[np.float64]
 
-#: A print moved so far is another one (plus range noise); it is forgotten when not seen for so long (s).
+#: A cluster farther (m, plus range noise) from its print begins it anew. A print is dropped when it is not seen for so
+#: long (s) though its place is seen to be free, or for so long whatever hides it.
 _STATIC_M, _GONE_S, _HIDDEN_S = 0.045, 0.5, 10.0
 #: What had rested for so long (s), or had been put there by hand for so long, and comes out again so near (m, and per
 #: metre of range) and as wide (share, m) as it was is the same: no foot steps so exactly.
@@ -25,9 +26,9 @@ _RESTED_S, _GIVEN_S, _SAME_M, _SAME_PER_M, _AS_WIDE, _WIDTH_M = 1.5, 0.5, 0.02, 
 _SPECK = 1.5
 #: And what so many meet is something else.
 _GROWN = 4
-#: What has been seen for so long (s) is not a foot of somebody whom one lost sight of before.
+#: What has been seen for so long (s) while somebody was out of sight is no foot of theirs.
 _NOT_HIS_S = 1.0
-#: Nor is what had been there for so long (s) when he was found not to stand on what is seen.
+#: Nor is what had lain there for so long (s) when it was found that they do not stand on what is seen of them.
 _BEFORE_S = 2.0
 #: No foot is so wide (m).
 _WIDE_M = 0.3

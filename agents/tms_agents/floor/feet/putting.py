@@ -100,7 +100,7 @@ def _is_he(body: Any, j: int) -> bool:
 
 @njit(cache=True)
 def count_feet(prints: Any, bodies: Any, t: float, dt: float) -> None:
-    """Note in ``spare`` for how long each print has been nobody's while everybody near it shows both feet elsewhere."""
+    """Count in ``spare`` for how long (s) nobody's prints were seen while all near them showed both feet elsewhere."""
     for j in range(prints.size):
         q = prints[j]
         if not q.used:

@@ -92,7 +92,7 @@ def _lay_there(q: Any, t: float) -> bool:
 
 @njit(cache=True)
 def nobodys(q: Any, landed: float) -> int:
-    """1 unless the print had been somebody else's foot all the time before a foot ``landed`` there."""
+    """1: the print is a thing that was put down. 0: before this foot ``landed`` there it was somebody else's foot."""
     return 0 if landed - q.first > _IDLE_S and q.idle < _IDLE_S else 1
 
 

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 
 #: Who was seen for so many scans is somebody.
 _SOMEBODY = 30
-#: Where somebody turns up again: so far away (m), and so fast (m/s); for how long he is waited for (s). He may stand on
-#: where he was for so long (s); who was lost so lately turns up rather than who was lost before.
+#: Who was lost turns up within so far (m), and so much farther each second (m/s), and is waited for so long (s); rather
+#: one who was lost so lately (s).
 _AWAY_M, _SPEED, _WAIT_S, _LATELY_S = 1.0, 1.0, 60.0, 20.0
 #: Who was seen last so far (m) on this side of the threshold may have turned round; then he is seen again within this
 #: (s), and believed so long (s) after that at most.

@@ -22,7 +22,7 @@ _GATE_M, _DOOR_M, _GONE_M = 0.7, 1.0, 0.3
 _UNSEEN_M = 0.3
 #: So near (m) the edge of what is seen somebody may go out of sight; by the way he came if that is so near (m).
 _EDGE_M, _WAY_M = 0.5, 1.7
-#: Who comes in where nothing tells that sight ends is hardly seen there: so near (m) others go out.
+#: Where somebody began to be seen far from every edge of sight feet are hardly seen: so near (m) others go out unseen.
 _FAINT_M = 1.0
 #: So many comings are remembered, the last ones.
 _MOST = 200

@@ -12,10 +12,11 @@ from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.background import FOREGROUND
 from tms_agents.floor.scan.furniture import ADOPTED, MOVED
 
-#: Who stays within this (m) for so long (s) is hardly ever so broad (m), in all (s) and in this share of the time:
-#: where people show legs; and where they may show shoes side by side, of whom no feet are known, and of whom they are.
+#: Who stays within this (m) hardly ever looks broader (m): where people show legs, where they may show shoes.
 _STAY_M, _BROAD_M, _BROAD_SHOES_M = 0.6, 0.3, 0.35
+#: What has stayed for so long (s), and was broader for longer (s) and for a larger share of that, is furniture.
 _STAYS_S, _SELDOM_S, _SELDOM = 6.0, 0.6, 0.04
+#: The same of whom the feet are known, where they may be shoes.
 _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
 #: Nor does he look so thin (m) for so much of the time, where people show legs and where they may show shoes; of shoes
 #: that far away that beams are farther apart than this (m) hardly more comes back, but not for so long (s).

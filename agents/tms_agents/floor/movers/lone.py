@@ -34,9 +34,9 @@ _STILL_S, _SHOD_S = 900.0, 60.0
 _CAME_M, _CAME_BOTH = 0.5, 10
 #: Whose other foot was last seen so near (m) stands on both.
 _STANCE_M = 0.4
-#: Two feet seen (within s) so near each other (m) are one thing, of which now this part is met, now that. Not what is
-#: as wide as no leg of his, it may be both; nor one print, now taken for this foot, now for that: a leg hides the
-#: other. But two shoes are not so near each other (m).
+#: Two feet that are seen within this time (s), and so near each other (m), are parts of one thing. But what is wider
+#: than a leg of theirs may be both of them; and where one print is taken for either foot in turn, one leg hides the
+#: other. Two shoes are never nearer than the last (m).
 _BOTH_SEEN_S, _ONE_M, _ONE_PRINT_M = 1.0, 0.08, 0.04
 #: Who had stood on one foot for so long (s) when he seemed to step away with the other has not gone.
 _STOOD_S = 20.0

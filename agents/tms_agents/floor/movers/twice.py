@@ -1,5 +1,5 @@
-"""Who begins to be seen far from every door was there before: he is one of those who stand beside, it seems, where a
-thing lies that he has put down."""
+"""Who begins to be seen far from every door was there before: somebody who seems to stand beside may be only a thing,
+which that person has put down before going on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tms_agents.floor.norm import norm
 _AWAY_M, _SPEED, _GONE_S = 1.2, 1.2, 3.0
 #: Who was seen so lately (s) seems to be there.
 _THERE_S = 0.5
-#: What he has put down he put down before he was seen elsewhere, or seemed to tread on so shortly (s) after that.
+#: What seems to be a foot of the old one landed no later (s) after the new one began.
 _PUT_S = 0.5
 #: What somebody has stood on for so long (s) is his foot.
 _STANDS_S = 20.0

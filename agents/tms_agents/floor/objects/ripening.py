@@ -45,8 +45,8 @@ _ASTRIDE_M, _ASTRIDE_S = 0.75, 4.0
 _LEANS_S = 6.0
 #: What joins it may be a thing while who stands or drives beside both has not gone, for so long (s).
 _JOINED_S = 3.0
-#: A part of something is joined to it in this share of the scans; what somebody brought who stayed for so long (s), and
-#: lies close to something, in less than that; where nothing has gone from the room it is so in nearly all of them.
+#: What is joined to the background in more than this share of the scans is a part of it; what somebody brought who then
+#: stayed for so long (s), in more than this share; where nothing has gone from the room, in more than the last.
 _JOINED, _STAYS_S, _CLOSE, _FUSED = 0.5, 1.0, 0.75, 0.9
 #: What is hidden for so long (s), and was just now (s), was in view for so long (s), in such a share of its sightings
 #: whole, while everybody near it showed both feet elsewhere for so long (s).

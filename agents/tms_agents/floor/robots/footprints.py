@@ -31,7 +31,7 @@ _BROAD = 0.3
 
 
 class Footprints:
-    """``robots``: (width, length) m of those there are; where none is told sizes are learned (`robot_sizes`).
+    """``robots``: (width, length) m of those there are; where none is told sizes are learned (`sizes`).
 
     ``gates``: where they come in. The bodies of ``association`` go where their footprints are.
     """

@@ -1,4 +1,4 @@
-"""A scan as those need it who ask whose feet it shows."""
+"""One segmented scan, as the kernels take it that ask whose feet it shows."""
 
 from __future__ import annotations
 

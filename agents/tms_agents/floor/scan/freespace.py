@@ -18,8 +18,9 @@ Point = tuple[float, float]
 #: and how far from beam to beam, rad.
 Sight = tuple[Array, NDArray[np.int8], Array, Array, float, float]
 
-#: What a scan says of a place: not in view, taken, hidden by something nearer, free, behind a wall, no echo at all.
-#: Half hidden, and seen past where the rest of it was met.
+#: What a scan says of a place: it is not in view, something is met there, something nearer hides it, beams pass it, it
+#: is behind a wall, nothing at all comes back from there. PAST: something hides most of a thing, but the beams that
+#: always met the rest of it pass now.
 UNSEEN, HIT, HIDDEN, FREE, WALLED, SILENT, PAST = 0, 1, 2, 3, 4, 5, 6
 
 #: What echoes less often is black or glossy.
@@ -37,8 +38,8 @@ _SMOOTH_M, _SMOOTH, _WIDEST_M = 0.015, 0.006, 0.28
 #: Beams that tell a shape; a face slants if its ends are so differently far (share of the width); two faces stand out
 #: before the line between their ends by so much (mean, share of its length).
 _PROFILE, _SLANT, _CORNER = 6, 0.13, 0.25
-#: What is seen of a half hidden thing is known when the same of it has been met so often, and so many times more often
-#: than passed; how fast it follows; of what echoes less often it is not.
+#: Which part of a half hidden thing shows is known after so many looks that met it, of which a look past it takes back
+#: so many; how fast that part follows; of what echoes less often than the last it is not asked.
 _STEADY, _SELDOM, _PART, _ECHOES = 30, 3, 0.2, 0.8
 #: So many beams beside a thing do not show the background alone; they show the thing at its range (m).
 _GUARD, _GOES_ON_M = 2, 0.1

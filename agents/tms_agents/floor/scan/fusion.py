@@ -27,9 +27,10 @@ _EVERY_S, _LEAST, _FADE = 10.0, 5e-4, 0.98
 
 
 class Extrinsics:
-    """Corrections of what each sensor measures, and of the poses of all but the first: it is what tells where all are.
+    """Corrections of the poses and of the range scales of all sensors, from what two of them saw of one foot at a time.
 
-    Weighted least squares, what is given as prior. ``told`` (n,): whether the scale of a sensor is known.
+    Weighted least squares, with what is given as prior. The pose of the first sensor is held: it is what ties the room
+    frame. ``told`` (n,): whether the scale of a sensor is known.
     """
 
     def __init__(self, poses: Sequence[Pose], told: Sequence[bool]) -> None:

@@ -61,7 +61,7 @@ class Fit:
 
 
 def fit_walls(points: Array, outline: Sequence[tuple[float, float]], start: Pose) -> Fit:
-    """The pose near ``start`` (half a metre, 30 degrees) at which most points (n, 2) lie on the outline (a polygon).
+    """The pose near ``start`` (half a metre, 20 degrees) at which most points (n, 2) lie on the outline (a polygon).
 
     Furniture before the walls does no harm as long as every direction has some wall left.
 
