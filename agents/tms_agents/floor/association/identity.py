@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 from tms_agents.floor.association.assignment import assign
 from tms_agents.floor.feet.build import LEGS_KNOWN, SHOES, SHOES_KNOWN
 from tms_agents.floor.feet.person import is_person
+from tms_agents.floor.feet.shine import PATCHES
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
-#: Standard deviation of the logarithm of the brightness in one sighting, at first (`shine.scatter`).
-_PATCHES = 0.12
 #: Standard deviations (s) of one stance, seen of a shoe or of a leg, and of how somebody walks of late; nothing tells
 #: more than so many deviations.
 _PACE, _PACE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
@@ -40,14 +39,14 @@ _UNNOTICED, _DOUBT, _SURE = 0.1, 0.02, 1.5
 
 
 @njit(cache=True)
-def alike(body: Any, name: Any, scattered: Array) -> float:
+def likeness(body: Any, name: Any, scattered: Array) -> float:
     """Log likelihood of how the body looked and walked of late, were it who is called like ``name``.
 
     ``scattered`` (3,) is what `shine.scatter` has learned.
     """
     value = 0.0
     if body.look_n > 0 and name.own_n >= _SEEN:
-        variance = scattered[1] + scattered[0] * _PATCHES**2 / body.look_n
+        variance = scattered[1] + scattered[0] * PATCHES**2 / body.look_n
         value -= 0.5 * min((body.look - name.own) ** 2 / variance, _FAR**2)
     if body.pace_n > 0 and name.own_pace_n >= _WALKED:
         stance = _PACE if body.shoe >= SHOES else _PACE_OF_LEGS
@@ -69,7 +68,7 @@ def _posterior(bodies: Any, b: int, belief: Array, scattered: Array, out: Array)
     for k in range(bodies.size):
         out[k] = 0.0
         if belief[b, k] > 0.0 and bodies[k].used and bodies[k].confirmed:
-            out[k] = belief[b, k] * np.exp(alike(bodies[b], bodies[k], scattered))
+            out[k] = belief[b, k] * np.exp(likeness(bodies[b], bodies[k], scattered))
             total += out[k]
     if total > 0.0:
         out /= total
@@ -153,7 +152,7 @@ def renamed(bodies: Any, belief: Array, t: float, scattered: Array, names: NDArr
         total = 0.0
         for j in range(n):
             b, k = rows[i], rows[j]
-            cost[i, j] = -np.log(max(belief[b, k], _UNNOTICED)) - alike(bodies[b], bodies[k], scattered)
+            cost[i, j] = -np.log(max(belief[b, k], _UNNOTICED)) - likeness(bodies[b], bodies[k], scattered)
             total += np.exp(-cost[i, j])
         bodies[rows[i]].sure = np.exp(-cost[i, i]) / total
     best = np.empty(n, np.int64)

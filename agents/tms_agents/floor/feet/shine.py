@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 #: The light that comes back falls with the range by this power (Kyushu University, `irvs/ros_tms`, tms_ss_fss).
 _FALL = 0.287
 #: Standard deviations of the logarithm: sides and seams of one shoe, one beam, and people in general; at first.
-_PATCHES, _BEAM, _PEOPLE = 0.12, 0.15, 0.4
+PATCHES, _BEAM, _PEOPLE = 0.12, 0.15, 0.4
 #: What is known of somebody never counts as better than this many sightings; the least that tell anything.
 _MEMORY, _LEAST = 40, 4
 #: So many sightings make how somebody looks of late, by which an exchange of names is noticed, and his own look.
@@ -69,7 +69,7 @@ def measure(
                 count += 1
         if count > 0:
             marks[k, 0] = total / count
-            marks[k, 1] = scattered[0] * (_PATCHES**2 + _BEAM**2 / count)
+            marks[k, 1] = scattered[0] * (PATCHES**2 + _BEAM**2 / count)
 
 
 @njit(cache=True)
@@ -93,7 +93,7 @@ def strangeness(body: Any, q: Any, scattered: Array) -> float:
     """How many standard deviations the print differs in brightness from the feet of the body; NaN: who knows."""
     if body.own_n < _KNOWN or q.shine_n < _OFTEN:
         return float(np.nan)
-    return float(abs(q.shine - body.own) / np.sqrt(scattered[1] + scattered[0] * _PATCHES**2))
+    return float(abs(q.shine - body.own) / np.sqrt(scattered[1] + scattered[0] * PATCHES**2))
 
 
 @njit(cache=True)

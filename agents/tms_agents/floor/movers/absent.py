@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tms_agents.floor.association.identity import alike
+from tms_agents.floor.association.identity import likeness
 from tms_agents.floor.events import FloorEvent, Vanished
 from tms_agents.floor.feet.left_feet import has_left
 from tms_agents.floor.feet.prints import thin
@@ -103,7 +103,7 @@ class Absent:
         self._missed = bool(saved["missed"])
 
     def find(self, body: Any, scattered: Array) -> Any:
-        """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `alike` takes."""
+        """Who of those waited for this new one most probably is, or None; ``scattered`` (3,) as `likeness` takes."""
         inside = self.inside(body)
         turning = self._turning if inside or self.doors.told else []
         for lost, within_s in ((turning, self._turns_s), (self._bodies if inside else [], _WAIT_S)):
@@ -149,7 +149,7 @@ class Absent:
         for index, one in enumerate(lost if body["wide"] <= 0.3 else []):
             since = max(0.0, float(body["first"]) - float(one["seen"]))
             gap = math.hypot(body["x0"] - one["x"], body["y0"] - one["y"]) / (_AWAY_M + _SPEED * since)
-            likely = float(alike(body, one, scattered))
+            likely = float(likeness(body, one, scattered))
             cost = 0.5 * gap + 0.5 * likely / _UNLIKE + (since > _LATELY_S)
             if since < within_s and gap < 1.0 and likely > _UNLIKE and cost < best_cost:
                 best, best_cost = index, cost

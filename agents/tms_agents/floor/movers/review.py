@@ -32,7 +32,7 @@ _LONE_S = 4.0
 #: Of what flickers now this is seen, now that: not one thing alone for so long (s).
 _SINGLE_S = 5.0
 #: No leg is broader (m).
-LEG_M = 0.2
+WIDEST_LEG_M = 0.2
 #: What was pushed stands still for so long (s): it is furniture.
 _PARKED_S = 5.0
 #: Who has not come from elsewhere on two feet, and rests for so long (s), is a thing.
@@ -54,7 +54,7 @@ _KNOWN = 200
 #: Who is believed was seen so often, and in this share of the scans that should have shown him.
 _HITS, _STEADY = 4.0, 0.6
 #: Of who is believed every sighting looks so much like feet (`footlike`), in the mean.
-_LIKELY = 0.45
+LIKELY = 0.45
 #: Who walks is believed after so long (s), or never.
 _UNSURE_S = 6.0
 #: Where somebody began looks free, or he still stands there, within this (m).
@@ -206,7 +206,7 @@ def review(
         if not body.used:
             continue
         unseen = t - body.seen
-        broad = body.wide > 0.3 or body.far > (_FAR_M if body.confirmed else LEG_M) or body.from_furniture == 1
+        broad = body.wide > 0.3 or body.far > (_FAR_M if body.confirmed else WIDEST_LEG_M) or body.from_furniture == 1
         if broad and unseen == 0.0 and norm(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
         if unseen == 0.0:
@@ -250,7 +250,7 @@ def _new(bodies: Any, b: int, t: float, sight: Sight, waits: Waits, learned: boo
             # One foot of somebody there is not seen now: this may be it.
             if away < 0.6 and not bodies[o].robot and max(t - bodies[o].a_seen, t - bodies[o].b_seen) > 0.3:
                 halved = True
-    if part or (pair and (halved or not learned or body.score < _LIKELY * body.hits)):
+    if part or (pair and (halved or not learned or body.score < LIKELY * body.hits)):
         body.used = 0
         return NOTHING
     if pair:
@@ -265,7 +265,7 @@ def _new(bodies: Any, b: int, t: float, sight: Sight, waits: Waits, learned: boo
         # Furniture that is pushed aside looks like a robot at first.
         needed_s, needed_m = 2.0 * needed_s, 2.0 * needed_m
     steady = body.hits >= max(_HITS, _STEADY * body.due)
-    if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, _LIKELY * body.hits):
+    if age >= needed_s and way >= needed_m and steady and body.score >= max(3.0, LIKELY * body.hits):
         came = _has_come(body, t, sight)
         return CONFIRM if came and not _is_put(bodies, b, t) else NOTHING
     return NOTHING

@@ -20,12 +20,13 @@ from tms_agents.floor.movers.review import (
     CONFIRM,
     FLICKERS,
     GONE,
-    LEG_M,
+    LIKELY,
     LOST,
     MOVED,
     NOTHING,
     PIECE,
     THING,
+    WIDEST_LEG_M,
     Waits,
     doubled,
     is_footless,
@@ -185,7 +186,7 @@ class Tracks:
             for index, body in enumerate(self.bodies):
                 new = body["used"] and not body["confirmed"] and body["seen"] == t and body["from_furniture"] == 0
                 steps = body["first"] > since - STEPS_S and body["hits"] >= _HITS and body["wide"] < 0.3
-                likely = body["score"] >= 0.45 * body["hits"]
+                likely = body["score"] >= LIKELY * body["hits"]
                 if new and steps and likely and math.hypot(body["x"] - x, body["y"] - y) < _SHIFT_M:
                     self._actions[index] = CONFIRM
 
@@ -338,7 +339,7 @@ class Tracks:
         """
         if body["footprint"] or (missing is not None and self.bodies[missing]["robot"]):
             return False
-        broad = body["far"] > (LEG_M if legs else _SHOES_M)
+        broad = body["far"] > (WIDEST_LEG_M if legs else _SHOES_M)
         return bool(broad and body["pushed"] > _PUSHED and self.absent.inside(body))
 
     def _go_on(self, index: int, old: Any) -> None:

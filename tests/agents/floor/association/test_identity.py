@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.floor.association.identity import alike, christen, renamed, unite
+from tms_agents.floor.association.identity import christen, likeness, renamed, unite
 from tms_agents.floor.feet.build import beat, size_up
 from tms_agents.floor.feet.nobodys import costs
 from tms_agents.floor.feet.shine import expected, learn
@@ -95,8 +95,8 @@ def test_who_is_found_again_may_be_one_of_those_beside() -> None:
 def test_who_is_not_known_yet_is_like_anybody() -> None:
     bodies, _ = people((7.4, 0.6), (6.9, 0.7))
     bodies["own_n"][1] = bodies["own_pace_n"][1] = 0
-    assert alike(bodies[0], bodies[1], expected()) == 0.0
-    assert alike(bodies[1], bodies[0], expected()) < -2.0
+    assert likeness(bodies[0], bodies[1], expected()) == 0.0
+    assert likeness(bodies[1], bodies[0], expected()) < -2.0
 
 
 def stride(body, width: float, cut: int = 0, sightings: int = 60) -> None:
@@ -145,7 +145,7 @@ def test_shoes_and_what_is_half_hidden_tell_no_width(shoe: float, cut: int, told
     names(bodies, belief)
     stride(bodies[0], 0.12, cut)
     bodies["shoe"] = shoe
-    assert (alike(bodies[0], bodies[0], expected()) < alike(bodies[0], bodies[1], expected())) == told
+    assert (likeness(bodies[0], bodies[0], expected()) < likeness(bodies[0], bodies[1], expected())) == told
 
 
 @pytest.mark.parametrize(
