@@ -18,9 +18,9 @@ from tms_agents.floor.association.adopting import adopt, complete
 from tms_agents.floor.association.assignment import assign
 from tms_agents.floor.association.association import Association
 from tms_agents.floor.feet.bodies import predict
-from tms_agents.floor.feet.nobodys import costs, known
+from tms_agents.floor.feet.brightness import scatter
+from tms_agents.floor.feet.clutter import costs, known
 from tms_agents.floor.feet.one_foot import UNLIKELY
-from tms_agents.floor.feet.shine import scatter
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.settings import Polygon
 from tms_agents.simulation.floor_world import LASERS, FloorWorld

@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from tms_agents.floor.feet.bodies import narrow
 from tms_agents.floor.feet.fitted import LEGS, SHOES, Legs, Shoes
 from tms_agents.floor.feet.likelihood import feet_by
-from tms_agents.floor.feet.missing import missed
+from tms_agents.floor.feet.missed import missed
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.settings import Polygon

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import FloorEvent, FloorLabel
+from tms_agents.floor.feet.brightness import measure, note
 from tms_agents.floor.feet.build import count_shoes, legs, only_legs
 from tms_agents.floor.feet.left_feet import has_left, take_back
 from tms_agents.floor.feet.own_feet import exchange
 from tms_agents.floor.feet.prints import attend, follow
 from tms_agents.floor.feet.putting import count_feet, set_aside
-from tms_agents.floor.feet.shine import measure, note
 from tms_agents.floor.feet.strays import release
-from tms_agents.floor.movers.outlook import Outlook
+from tms_agents.floor.movers.coverage import Coverage
 from tms_agents.floor.movers.tracks import Tracks
 from tms_agents.floor.objects.objects import Objects
 from tms_agents.floor.objects.patience import brings
@@ -73,7 +73,7 @@ class FloorEstimator:
         self._association = Association(_BODIES, _PRINTS, self._scene.seats)
         self._shoes = legs()
         self._tracks = Tracks(self._association, self._settings, self._scene)
-        self._outlook = Outlook(self._scene, self._tracks.absent.doors)
+        self._coverage = Coverage(self._scene, self._tracks.absent.doors)
         self._objects = Objects(empty(THING, _THINGS), self._settings)
         self._furniture = Furniture()
         self._footprints = Footprints(self._scene.robots, self._gates, self._association)
@@ -112,7 +112,7 @@ class FloorEstimator:
                 self._extrinsics.place(view.index, fit.pose)
             events = self._understand(view, states, t, dt, _lights(intensities, view.n))
         background.learn(view.ranges, view.claimed, dt)
-        self._outlook.look(list(self._views.values()), t, dt)
+        self._coverage.look(list(self._views.values()), t, dt)
         return events
 
     def labels(self) -> list[FloorLabel]:

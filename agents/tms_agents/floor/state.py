@@ -41,7 +41,7 @@ PRINT = np.dtype(
         ("still_x", "f8"),  # m, where it has not moved
         ("still_y", "f8"),
         ("still", "f8"),  # s, since when
-        ("shine", "f8"),  # how bright it is (`shine.measure`)
+        ("shine", "f8"),  # how bright it is (`brightness.measure`)
         ("shine_n", "i8"),  # of how many sightings
         ("sensor", "i8"),  # of the last sighting: by which sensor
         ("first_beam", "i8"),  # from which beam
@@ -123,12 +123,12 @@ _OF_FEET = [
     ("shine_n", "i8"),  # of how many sightings
     ("own", "f8"),  # of the one whose name it has: how bright
     ("own_n", "i8"),
-    ("own_pace", "f8"),  # how long a stance takes (s)
-    ("own_pace_n", "i8"),
-    ("own_girth", "f8"),  # how wide a leg is (m)
-    ("own_girth_n", "i8"),
-    ("own_sole", "f8"),  # how long a shoe (m)
-    ("own_sole_n", "i8"),
+    ("own_stance", "f8"),  # how long a stance takes (s)
+    ("own_stance_n", "i8"),
+    ("own_leg_width", "f8"),  # how wide a leg is (m)
+    ("own_leg_width_n", "i8"),
+    ("own_shoe_length", "f8"),  # how long a shoe (m)
+    ("own_shoe_length_n", "i8"),
     ("doubted", "i8"),  # ``both`` when it was last found to be nowhere
     ("held", "f8"),  # s, until when it stays where it was put back
 ]
@@ -163,12 +163,12 @@ _BESIDES = [
 _LATELY = [
     ("look", "f8"),  # how bright it is
     ("look_n", "i8"),
-    ("pace", "f8"),  # how long a stance takes (s)
-    ("pace_n", "i8"),
-    ("girth", "f8"),  # how wide a leg is (m)
-    ("girth_n", "i8"),
-    ("sole", "f8"),  # how long a shoe (m)
-    ("sole_n", "i8"),
+    ("stance", "f8"),  # how long a stance takes (s)
+    ("stance_n", "i8"),
+    ("leg_width", "f8"),  # how wide a leg is (m)
+    ("leg_width_n", "i8"),
+    ("shoe_length", "f8"),  # how long a shoe (m)
+    ("shoe_length_n", "i8"),
     ("sure", "f8"),  # how likely its name is
 ]
 BODY = np.dtype([*_OF_FEET, *_BESIDES, *_LATELY])

@@ -11,7 +11,7 @@ import numpy as np
 from tms_agents.compiled import version
 from tms_agents.devices.scans import Sweep
 from tms_agents.floor import FloorEstimator, FloorSettings, Sensor
-from tms_agents.floor.feet.nobodys import costs
+from tms_agents.floor.feet.clutter import costs
 from tms_agents.floor.feet.prints import follow
 from tms_agents.floor.robots.sizes import weigh
 from tms_agents.floor.scan.dark import dark_width

@@ -16,16 +16,16 @@ from tms_agents.floor import Appeared, FloorEstimator, FloorSettings, Scene, Sen
 from tms_agents.floor.association.association import Association
 from tms_agents.floor.events import Back, Moved, Stale
 from tms_agents.floor.feet.bodies import narrow
+from tms_agents.floor.feet.clutter import costs
 from tms_agents.floor.feet.likelihood import feet
-from tms_agents.floor.feet.missing import missed
-from tms_agents.floor.feet.nobodys import costs
+from tms_agents.floor.feet.missed import missed
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.movers.review import CONFIRM, NOTHING, THING, Waits, review
 from tms_agents.floor.movers.tracks import Tracks
 from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND, NO_ECHO
 from tms_agents.floor.scan.masks import Area, Masks, joined
+from tms_agents.floor.scan.no_echo import vacant
 from tms_agents.floor.scan.segmentation import CLUSTER, FADES, Segmenter
-from tms_agents.floor.scan.silence import vacant
 from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0
@@ -49,7 +49,7 @@ def at(one: Tracks, t: float) -> list:
 def walker(body: np.ndarray, x: float, y: float, v: tuple[float, float], seen: float) -> None:
     """Somebody believed who was seen last at (x, y) and has gone on at v since."""
     body["used"] = body["confirmed"] = body["label"] = 1
-    body["hits"], body["both"], body["quality"], body["own_pace_n"], body["far"] = 300, 250, 1.0, 5, 0.12
+    body["hits"], body["both"], body["quality"], body["own_stance_n"], body["far"] = 300, 250, 1.0, 5, 0.12
     gone = NOW - seen
     body["x"], body["y"], body["vx"], body["vy"] = x + gone * v[0], y + gone * v[1], *v
     body["told_x"], body["told_y"], body["seen"], body["rest_at"] = x, y, seen, seen
@@ -204,7 +204,7 @@ def test_what_rests_and_never_showed_two_feet_or_took_a_step_is_a_thing(
     """A bin that was pushed is as wide as two feet side by side, and has none. Who shuffles takes no steps."""
     bodies, actions = empty(BODY, 1), np.zeros(1, np.int64)
     walker(bodies[0], 3.0, 0.0, (0.0, 0.0), NOW)
-    bodies["own_pace_n"], bodies["both"], bodies["rest_at"], bodies["rest_x"] = steps, feet, NOW - 31.0, 3.0
+    bodies["own_stance_n"], bodies["both"], bodies["rest_at"], bodies["rest_x"] = steps, feet, NOW - 31.0, 3.0
     bodies["x0"] = x0
     review(bodies, NOW, 0.1, OPEN, WAITS, actions, False, True, False)
     assert (actions[0] == THING) == thing
@@ -218,7 +218,7 @@ def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, h
     assert [type(event) for event in at(one, NOW - 0.1)] == [Stale]
     walker(one.bodies[1], 3.5, 1.0, (0.0, 0.0), NOW)
     new = one.bodies[1]
-    new["confirmed"], new["own_pace_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0
+    new["confirmed"], new["own_stance_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0
     new["first"], new["x0"], new["y0"], new["width"], new["far"] = NOW - 1.0, 3.1, 1.0, width, width
     new["a_since"] = new["b_since"] = NOW - 0.3
     events = at(one, NOW)

@@ -10,12 +10,12 @@ from floor_prints import NOW, resting, shows
 from floor_rooms import Room, thing, together, walker
 
 from tms_agents.floor import Appeared, Scene
+from tms_agents.floor.feet.brightness import expected
+from tms_agents.floor.feet.clutter import costs, known, nobodys
 from tms_agents.floor.feet.likelihood import too_wide
-from tms_agents.floor.feet.nobodys import costs, known, nobodys
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.feet.prints import attend
 from tms_agents.floor.feet.putting import count_feet, set_aside
-from tms_agents.floor.feet.shine import expected
 from tms_agents.floor.objects.patience import brings
 from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
@@ -258,7 +258,7 @@ def test_a_foot_as_wide_as_two_legs_is_none_if_the_other_leg_is_seen_somewhere_e
         bodies["hits"], bodies["looks"], bodies["seen"], bodies["pp"] = 100, 100, 9.9, 0.01
         bodies["ax"], bodies["a_seen"], bodies["a_print"] = 0.2, 9.9, -1
         bodies["bx"], bodies["b_seen"], bodies["b_print"] = (-0.2 if apart else 0.2), 9.9, -1
-        bodies["own_girth"], bodies["own_girth_n"] = 0.11, seen
+        bodies["own_leg_width"], bodies["own_leg_width_n"] = 0.11, seen
         clusters["x"], clusters["n"], clusters["width"], clusters["spacing"] = 0.2, 20, width, 0.01
         cost = np.zeros((1, 3))
         costs(shows(clusters, prints, 10.0), np.ones(1, np.bool_), bodies, np.zeros(1, np.int64), cost)
@@ -269,7 +269,7 @@ def test_a_foot_as_wide_as_two_legs_is_none_if_the_other_leg_is_seen_somewhere_e
 @pytest.mark.parametrize(("length", "dearer"), [(0.29, 0.0), (0.35, 4.0)])
 def test_no_shoe_is_longer_than_any(length: float, dearer: float) -> None:
     body, cluster = empty(BODY, 1)[0], np.zeros(1, CLUSTER)[0]
-    body["shoe"], body["own_sole"], body["own_sole_n"] = 1.0, 0.27, 50
+    body["shoe"], body["own_shoe_length"], body["own_shoe_length_n"] = 1.0, 0.27, 50
     cluster["width"] = length
     assert too_wide(body, cluster) == dearer
 

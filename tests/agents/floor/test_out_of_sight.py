@@ -11,8 +11,8 @@ from floor_robots import OPEN
 from floor_rooms import Room, sweep, together, walker
 
 from tms_agents.floor import Appeared, FloorEstimator, Moved, Scene, Sensor, Vanished
+from tms_agents.floor.movers.coverage import Coverage
 from tms_agents.floor.movers.doors import Doors
-from tms_agents.floor.movers.outlook import Outlook
 from tms_agents.floor.scan.masks import Area
 from tms_agents.floor.state import BODY, empty
 
@@ -68,7 +68,7 @@ def test_how_far_before_a_gate_sight_ends(reach_m: float, unseen: bool) -> None:
     gates = Doors(Area([GATE]))
     scene = Scene(region=REGION, gates=[GATE])
     estimator, _ = Room(lambda _: (), lambda _: OPEN, sensors=short_sighted(reach_m)).play(12.0, scene=scene)
-    Outlook(scene, gates).look(list(estimator._views.values()), 10.0, 0.1)
+    Coverage(scene, gates).look(list(estimator._views.values()), 10.0, 0.1)
     # The nearest corner of the gate; feet are hardly seen before the end of the reach.
     assert gates.unseen_m == [pytest.approx(np.hypot(4.45, 1.15) - (reach_m - 0.3), abs=0.1) if unseen else 0.0]
 

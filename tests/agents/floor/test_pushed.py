@@ -35,7 +35,7 @@ def somebody(body: Any, x: float, y: float, **fields: float) -> None:
     """Somebody known for long who walks at (x, y)."""
     seen = {"label": 1, "seen": NOW, "a_seen": NOW, "b_seen": NOW, "first": 10.0, "told_x": x, "told_y": y}
     feet = {"ax": x, "ay": y, "bx": x, "by": y + 0.2, "a_print": 2, "b_print": 3, "a_since": NOW, "b_since": NOW}
-    known = {"hits": 900, "looks": 900, "both": 400, "own_pace_n": 20, "quality": 1.0, "x0": 8.0}
+    known = {"hits": 900, "looks": 900, "both": 400, "own_stance_n": 20, "quality": 1.0, "x0": 8.0}
     rests = {"rest_x": x, "rest_y": y, "rest_at": NOW, "suspected": -1e9}
     legs = {"width": 0.1, "far": 0.12}
     fill(body, used=1, confirmed=1, x=x, y=y, **(seen | feet | known | legs | rests | fields))

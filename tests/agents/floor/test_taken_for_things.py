@@ -8,9 +8,9 @@ from floor_rooms import Circle, Room
 
 from tms_agents.floor import Appeared
 from tms_agents.floor.feet.bodies import stuck
+from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.feet.build import SHOD, legs
 from tms_agents.floor.feet.prints import ALONE, UNLIKE, attend, follow, lay_before
-from tms_agents.floor.feet.shine import expected
 from tms_agents.floor.movers.review import LOST, Waits, review
 from tms_agents.floor.objects.objects import Objects
 from tms_agents.floor.objects.ripening import OBJECT
@@ -110,7 +110,7 @@ def standing(x: float, other_x: float, *, shoe: float = 0.0) -> np.ndarray:
     """
     bodies = empty(BODY, 1)
     bodies["used"] = bodies["confirmed"] = 1
-    bodies["own_pace_n"], bodies["both"], bodies["hits"], bodies["quality"] = 5, 200, 500, 1.0
+    bodies["own_stance_n"], bodies["both"], bodies["hits"], bodies["quality"] = 5, 200, 500, 1.0
     bodies["x"], bodies["ax"], bodies["told_x"], bodies["bx"], bodies["shoe"] = x, x, x, other_x, shoe
     bodies["a_land"] = bodies["a_since"] = NOW - 1.0
     bodies["b_land"], bodies["b_seen"] = NOW - 4.0, NOW - 3.0
@@ -137,7 +137,7 @@ def test_who_came_on_two_feet_may_stand_with_one_behind_the_other(
     paces: int, both: int, way: float, shoe: float, lost: bool
 ) -> None:
     bodies = standing(2.0, 2.1, shoe=shoe)
-    bodies["own_pace_n"], bodies["both"] = paces, both
+    bodies["own_stance_n"], bodies["both"] = paces, both
     bodies["x0"], bodies["rest_x"] = 2.0 + way, 2.0
     assert (LOST in found(bodies, 14.0)) == lost
 
@@ -211,7 +211,7 @@ def test_two_feet_at_one_place_are_one_thing(apart: float, odd: int, lost: bool)
     """Now this part of a box is met, now that, and each is taken for a foot."""
     bodies = standing(2.0, 2.0 + apart)
     bodies["odd"], bodies["b_print"] = odd, 1
-    bodies["own_pace_n"] = 0
+    bodies["own_stance_n"] = 0
     actions = np.zeros(1, np.int64)
     said = []
     for k in range(60):

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from tms_agents.floor.association.assignment import assign
 from tms_agents.floor.feet.bodies import begin, narrow, together, update
+from tms_agents.floor.feet.brightness import learn
+from tms_agents.floor.feet.clutter import costs
 from tms_agents.floor.feet.likelihood import too_wide
-from tms_agents.floor.feet.missing import expect, missed, out_of_reach
-from tms_agents.floor.feet.nobodys import costs
+from tms_agents.floor.feet.missed import expect, missed, out_of_reach
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.feet.person import is_person
-from tms_agents.floor.feet.shine import learn
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.scan.freespace import Sight

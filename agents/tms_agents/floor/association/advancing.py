@@ -37,7 +37,7 @@ def advance(
 ) -> int:
     """One scan for the first ``count`` hypotheses of ``now`` with ``scores`` (kept,): how many there are ``after`` it.
 
-    The best is the first. ``scattered`` (3,) is what `shine.scatter` has learned; ``seats`` as `missed` takes them.
+    The best is the first. ``scattered`` (3,) is what `brightness.scatter` has learned; ``seats`` as `missed` takes.
     ``taken`` (m,) becomes which clusters are somebody's in the best. What was in ``now`` is overwritten.
     """
     # Out of the loops: whenever a field of a tuple is taken, its users are counted.

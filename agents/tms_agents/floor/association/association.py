@@ -13,9 +13,9 @@ from tms_agents.floor.association.advancing import advance
 from tms_agents.floor.association.hypotheses import nothing_known, settle
 from tms_agents.floor.association.identity import christen, renamed
 from tms_agents.floor.feet.bodies import begin
+from tms_agents.floor.feet.brightness import expected, scatter
 from tms_agents.floor.feet.build import agree
 from tms_agents.floor.feet.left_feet import put
-from tms_agents.floor.feet.shine import expected, scatter
 from tms_agents.floor.scan.clustered import BLANK, ClusteredScan
 from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.scan.masks import joined
@@ -31,7 +31,16 @@ _POOL = 256
 #: Who began so near (m) the end of a robot is a part of it.
 _BEGAN_M = 0.1
 #: What is known of who has a name; what belongs to a name, not to the body that has it.
-OWN = ("own", "own_n", "own_pace", "own_pace_n", "own_girth", "own_girth_n", "own_sole", "own_sole_n")
+OWN = (
+    "own",
+    "own_n",
+    "own_stance",
+    "own_stance_n",
+    "own_leg_width",
+    "own_leg_width_n",
+    "own_shoe_length",
+    "own_shoe_length_n",
+)
 NAMED = ("label", "first", *OWN, "told_x", "told_y")
 
 

@@ -15,16 +15,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.association.assignment import assign
+from tms_agents.floor.feet.brightness import PATCHES
 from tms_agents.floor.feet.build import LEGS_KNOWN, SHOES, SHOES_KNOWN
 from tms_agents.floor.feet.person import is_person
-from tms_agents.floor.feet.shine import PATCHES
 from tms_agents.floor.norm import norm
 
 Array = NDArray[np.float64]
 
 #: Standard deviations (s) of one stance, seen of a shoe or of a leg, and of how somebody walks of late; nothing tells
 #: more than so many deviations.
-_PACE, _PACE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
+_STANCE, _STANCE_OF_LEGS, _MOOD, _FAR = 0.1, 0.17, 0.02, 3.5
 #: Standard deviations (m) of how wide a leg looks in one sighting (a few beams, scans alike), and of late.
 _WIDTH_M, _TROUSERS_M = 0.015, 0.004
 #: The same of how long a shoe looks.
@@ -42,22 +42,22 @@ _UNNOTICED, _DOUBT, _SURE = 0.1, 0.02, 1.5
 def likeness(body: Any, name: Any, scattered: Array) -> float:
     """Log likelihood of how the body looked and walked of late, were it who is called like ``name``.
 
-    ``scattered`` (3,) is what `shine.scatter` has learned.
+    ``scattered`` (3,) is what `brightness.scatter` has learned.
     """
     value = 0.0
     if body.look_n > 0 and name.own_n >= _SEEN:
         variance = scattered[1] + scattered[0] * PATCHES**2 / body.look_n
         value -= 0.5 * min((body.look - name.own) ** 2 / variance, _FAR**2)
-    if body.pace_n > 0 and name.own_pace_n >= _WALKED:
-        stance = _PACE if body.shoe >= SHOES else _PACE_OF_LEGS
-        variance = stance**2 * (1.0 / body.pace_n + 1.0 / name.own_pace_n) + _MOOD**2
-        value -= 0.5 * min((body.pace - name.own_pace) ** 2 / variance, _FAR**2)
-    if body.girth_n > 0 and name.own_girth_n >= LEGS_KNOWN and body.shoe < SHOES:
-        variance = _WIDTH_M**2 * (1.0 / body.girth_n + 1.0 / name.own_girth_n) + _TROUSERS_M**2
-        value -= 0.5 * min((body.girth - name.own_girth) ** 2 / variance, _FAR**2)
-    if body.sole_n > 0 and name.own_sole_n >= SHOES_KNOWN and body.shoe >= SHOES:
-        variance = _SOLE_M**2 * (1.0 / body.sole_n + 1.0 / name.own_sole_n) + _SOLES_M**2
-        value -= 0.5 * min((body.sole - name.own_sole) ** 2 / variance, _FAR**2)
+    if body.stance_n > 0 and name.own_stance_n >= _WALKED:
+        stance = _STANCE if body.shoe >= SHOES else _STANCE_OF_LEGS
+        variance = stance**2 * (1.0 / body.stance_n + 1.0 / name.own_stance_n) + _MOOD**2
+        value -= 0.5 * min((body.stance - name.own_stance) ** 2 / variance, _FAR**2)
+    if body.leg_width_n > 0 and name.own_leg_width_n >= LEGS_KNOWN and body.shoe < SHOES:
+        variance = _WIDTH_M**2 * (1.0 / body.leg_width_n + 1.0 / name.own_leg_width_n) + _TROUSERS_M**2
+        value -= 0.5 * min((body.leg_width - name.own_leg_width) ** 2 / variance, _FAR**2)
+    if body.shoe_length_n > 0 and name.own_shoe_length_n >= SHOES_KNOWN and body.shoe >= SHOES:
+        variance = _SOLE_M**2 * (1.0 / body.shoe_length_n + 1.0 / name.own_shoe_length_n) + _SOLES_M**2
+        value -= 0.5 * min((body.shoe_length - name.own_shoe_length) ** 2 / variance, _FAR**2)
     return value
 
 
@@ -112,9 +112,9 @@ def unite(
         if of[b] >= 0 and of[b] != b:
             belief[b] = mixed[b]
             bodies[b].look_n = 0
-            bodies[b].pace_n = 0
-            bodies[b].girth_n = 0
-            bodies[b].sole_n = 0
+            bodies[b].stance_n = 0
+            bodies[b].leg_width_n = 0
+            bodies[b].shoe_length_n = 0
 
 
 @njit(cache=True)

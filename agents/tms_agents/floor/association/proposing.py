@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tms_agents.floor.association.adopting import chosen
 from tms_agents.floor.association.assignment import Work, at_least, one_of, reassign, solve, work
 from tms_agents.floor.association.hypotheses import Hypotheses
+from tms_agents.floor.feet.clutter import goes_on, known, nobodys, spanned
 from tms_agents.floor.feet.likelihood import feet
-from tms_agents.floor.feet.nobodys import goes_on, known, nobodys, spanned
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.scan.clustered import ClusteredScan
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import njit
 
-from tms_agents.floor.feet.build import SHOES, SHOES_KNOWN, WALKS, astray, from_side, sole
+from tms_agents.floor.feet.build import SHOES, SHOES_KNOWN, WALKS, astray, from_side, shoe_length
 from tms_agents.floor.feet.fitted import Shoes
 from tms_agents.floor.feet.landing import Way, lands
 from tms_agents.floor.feet.one_foot import UNLIKELY, Candidate, OneFoot, alone, beside, stands
@@ -40,8 +40,8 @@ def another_shoe(body: Any, c: Any, shoes: Shoes) -> float:
     if body.shoe < SHOES or not from_side(c):
         return 0.0
     value = 0.0
-    if body.own_sole_n >= SHOES_KNOWN:
-        value += min(0.5 * ((sole(c) - body.own_sole) / shoes.sole_m) ** 2, shoes.another)
+    if body.own_shoe_length_n >= SHOES_KNOWN:
+        value += min(0.5 * ((shoe_length(c) - body.own_shoe_length) / shoes.sole_m) ** 2, shoes.another)
     if norm(body.vx, body.vy) > WALKS:
         value += min(0.5 * (astray(body, c) / shoes.turned) ** 2, shoes.astray)
     return value

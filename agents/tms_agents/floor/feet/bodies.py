@@ -123,10 +123,10 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.stay_thin, body.stay_lands, body.spacing = 0.0, 0.0, c.spacing
     body.shoe, body.leg, body.odd = 0.0, 0.0, 0
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
-    body.pace, body.pace_n, body.own_pace, body.own_pace_n = 0.0, 0, 0.0, 0
-    body.girth, body.girth_n, body.own_girth, body.own_girth_n = 0.0, 0, 0.0, 0
+    body.stance, body.stance_n, body.own_stance, body.own_stance_n = 0.0, 0, 0.0, 0
+    body.leg_width, body.leg_width_n, body.own_leg_width, body.own_leg_width_n = 0.0, 0, 0.0, 0
     body.ex, body.ey, body.e_at = 0.0, 0.0, -1e9
-    body.sole, body.sole_n, body.own_sole, body.own_sole_n = 0.0, 0, 0.0, 0
+    body.shoe_length, body.shoe_length_n, body.own_shoe_length, body.own_shoe_length_n = 0.0, 0, 0.0, 0
     body.look, body.look_n, body.sure, body.doubted, body.held = 0.0, 0, 1.0, 0, -1e9
     body.suspected = -1e9
 
@@ -275,7 +275,7 @@ def stuck(body: Any, t: float) -> tuple[float, float, float] | None:
     a, b = t - body["a_seen"] < _SEEN_S, t - body["b_seen"] < _SEEN_S
     if body["robot"] or body["stale"]:
         return None
-    if a and b and body["a_print"] == body["b_print"] and t - body["a_since"] < _JUST_S and body["own_girth_n"] > 0:
+    if a and b and body["a_print"] == body["b_print"] and t - body["a_since"] < _JUST_S and body["own_leg_width_n"] > 0:
         # Both feet have just become one: it may be what stood between them.
         return float(body["x"]), float(body["y"]), float(body["a_since"])
     if a == b:

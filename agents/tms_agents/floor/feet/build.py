@@ -26,7 +26,7 @@ _EXPECTED, _LONG = 20.0, 1000.0
 #: A foot stands and swings for so long (s) while somebody walks.
 _STANCE_S, _SWING_S = (0.3, 1.1), (0.25, 0.75)
 #: So many stances tell somebody's beat of late, and his own.
-_PACE_MEMORY, _PACE_LIFE = 12, 80
+_STANCE_MEMORY, _STANCE_LIFE = 12, 80
 #: So many sightings tell how wide somebody's legs are of late, how long his shoes, and both of who has the name.
 _LEGS_MEMORY, _SHOES_MEMORY, _SIZE_LIFE = 300, 15, 1000
 #: So many sightings of legs, or of shoes from the side, tell how wide or how long they are.
@@ -44,8 +44,8 @@ _PLENTY, _ALL_LEGS, _ALL_SHOES = 150.0, 0.1, 0.45
 _FEW, _NO_SHOE = 50.0, 0.05
 #: What stands alone looks less than so many times, and so much (m), wider than it mostly does.
 _JOINED, _JOINED_M = 1.3, 0.03
-#: The toes and the heel of a shoe are that wide, as a share of its length (`sole`); both are in view if it looks so
-#: wide (m), and it points along the way (sine of the angle).
+#: The toes and the heel of a shoe are that wide, as a share of its length; both are in view if it looks so wide (m) and
+#: points along the way (sine of the angle).
 _TOES, _SIDE_M, _ASTRAY = 0.3, 0.19, 0.5
 
 
@@ -65,9 +65,9 @@ def mean(value: float, count: int, new: float, most: int) -> tuple[float, int]:
 def beat(body: Any, stood: float, swung: float) -> None:
     """Learn from a stance of ``stood`` s, before a swing of ``swung`` s, at what beat the body walks."""
     if _STANCE_S[0] < stood < _STANCE_S[1] and _SWING_S[0] < swung < _SWING_S[1]:
-        body.pace, body.pace_n = mean(body.pace, body.pace_n, stood, _PACE_MEMORY)
+        body.stance, body.stance_n = mean(body.stance, body.stance_n, stood, _STANCE_MEMORY)
         if body.sure >= SURE:
-            body.own_pace, body.own_pace_n = mean(body.own_pace, body.own_pace_n, stood, _PACE_LIFE)
+            body.own_stance, body.own_stance_n = mean(body.own_stance, body.own_stance_n, stood, _STANCE_LIFE)
 
 
 @njit(cache=True)
@@ -81,26 +81,30 @@ def size_up(body: Any, c: Any) -> None:
         return
     body.leg += (0.05 if body.leg > 0.0 else 1.0) * (c.width - body.leg)
     if c.width < _SHOE_M[0]:
-        body.girth, body.girth_n = mean(body.girth, body.girth_n, c.width, _LEGS_MEMORY)
+        body.leg_width, body.leg_width_n = mean(body.leg_width, body.leg_width_n, c.width, _LEGS_MEMORY)
         if body.sure >= SURE:
-            body.own_girth, body.own_girth_n = mean(body.own_girth, body.own_girth_n, c.width, _SIZE_LIFE)
+            body.own_leg_width, body.own_leg_width_n = mean(
+                body.own_leg_width, body.own_leg_width_n, c.width, _SIZE_LIFE
+            )
     elif from_side(c) and astray(body, c) < _ASTRAY:
-        length = sole(c)
-        body.sole, body.sole_n = mean(body.sole, body.sole_n, length, _SHOES_MEMORY)
+        length = shoe_length(c)
+        body.shoe_length, body.shoe_length_n = mean(body.shoe_length, body.shoe_length_n, length, _SHOES_MEMORY)
         if body.sure >= SURE:
-            body.own_sole, body.own_sole_n = mean(body.own_sole, body.own_sole_n, length, _SIZE_LIFE)
+            body.own_shoe_length, body.own_shoe_length_n = mean(
+                body.own_shoe_length, body.own_shoe_length_n, length, _SIZE_LIFE
+            )
 
 
 @njit(cache=True)
 def wears_shoes(body: Any) -> bool:
     """Whether shoes are what was seen of him when he walked: two legs side by side may look like one from its side."""
-    return bool(body.own_sole_n >= SHOES_KNOWN)
+    return bool(body.own_shoe_length_n >= SHOES_KNOWN)
 
 
 @njit(cache=True)
 def knows_feet(body: Any) -> bool:
     """Whether it is known how wide the legs or how long the shoes are of the one whose name it has."""
-    return bool(body.own_girth_n >= LEGS_KNOWN or wears_shoes(body))
+    return bool(body.own_leg_width_n >= LEGS_KNOWN or wears_shoes(body))
 
 
 @njit(cache=True)
@@ -122,7 +126,7 @@ def astray(body: Any, c: Any) -> float:
 
 
 @njit(cache=True)
-def sole(c: Any) -> float:
+def shoe_length(c: Any) -> float:
     """How long (m) the shoe is that is seen from its side.
 
     The ends of what is seen of two discs, toes and heel, with their middles 0.7 of a length apart: aslant it shows less

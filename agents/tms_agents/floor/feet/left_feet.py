@@ -12,8 +12,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.bodies import begin
+from tms_agents.floor.feet.brightness import strangeness
 from tms_agents.floor.feet.person import is_person
-from tms_agents.floor.feet.shine import strangeness
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.segmentation import CLUSTER
 

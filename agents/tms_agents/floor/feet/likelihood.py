@@ -12,12 +12,12 @@ from tms_agents.floor.feet import fitted
 from tms_agents.floor.feet.as_leg import anywhere, as_leg
 from tms_agents.floor.feet.as_shoe import another_shoe, as_shoe
 from tms_agents.floor.feet.bodies import LONGEST_M, STAND_M, WIDE_M, narrow, scant, together
+from tms_agents.floor.feet.brightness import unlike
 from tms_agents.floor.feet.build import LEGS_KNOWN, LONGEST_SHOE_M, SHOES, wears_shoes
 from tms_agents.floor.feet.fitted import Legs, Shoes
 from tms_agents.floor.feet.landing import Way, way
 from tms_agents.floor.feet.one_foot import FRESH_S, UNLIKELY, Candidate, OneFoot, apart, one_foot
 from tms_agents.floor.feet.prints import lay_before
-from tms_agents.floor.feet.shine import unlike
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.state import SEATED
@@ -173,9 +173,9 @@ def _shape(c: Any, body: Any, shape: float) -> float:
 @njit(cache=True)
 def _stouter(body: Any, c: Any) -> float:
     """Negative log likelihood of a leg being so much wider or narrower than those of the one who has the name."""
-    if body.own_girth_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > LEG_M:
+    if body.own_leg_width_n < LEGS_KNOWN or body.shoe >= SHOES or c.cut or c.width > LEG_M:
         return 0.0
-    return float(0.5 * min(((c.width - body.own_girth) / _GIRTH_M) ** 2, _OTHER))
+    return float(0.5 * min(((c.width - body.own_leg_width) / _GIRTH_M) ** 2, _OTHER))
 
 
 @njit(cache=True)
@@ -183,7 +183,7 @@ def too_wide(body: Any, c: Any) -> float:
     """Negative log likelihood of one foot looking so wide: of a shoe, or of a leg, where two may be side by side."""
     if body.shoe >= SHOES:
         return _TOO_WIDE if wears_shoes(body) and c.width > LONGEST_SHOE_M else 0.0
-    if body.own_girth_n < LEGS_KNOWN or c.width <= LEG_M:
+    if body.own_leg_width_n < LEGS_KNOWN or c.width <= LEG_M:
         return 0.0
     return _PAIR if c.width < _PAIR_M else _TOO_WIDE
 

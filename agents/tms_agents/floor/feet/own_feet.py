@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.feet.brightness import ALIKE, STRANGE, alike, strangeness
 from tms_agents.floor.feet.gait import swap
 from tms_agents.floor.feet.person import is_person
-from tms_agents.floor.feet.shine import ALIKE, STRANGE, alike, strangeness
 from tms_agents.floor.feet.strays import nobodys, take
 from tms_agents.floor.norm import norm
 
@@ -43,7 +43,7 @@ def exchange(bodies: Any, prints: Any, t: float, scattered: Array) -> int:
     """Give ``bodies`` (n,) their own foot back where what is taken for it is much brighter or darker than their feet.
 
     It is exchanged for one of the ``prints`` beside it that looks like their feet; where there is none their own foot
-    is hidden, and they stand on the other alone. ``scattered`` (3,) is what `shine.scatter` has learned. How many
+    is hidden, and they stand on the other alone. ``scattered`` (3,) is what `brightness.scatter` has learned. How many
     bodies have changed.
     """
     count = 0

@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.feet.brightness import STRANGE, strangeness
 from tms_agents.floor.feet.build import SHOD, SHOES, joined
-from tms_agents.floor.feet.shine import STRANGE, strangeness
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, clear
-from tms_agents.floor.scan.silence import blank, silent
+from tms_agents.floor.scan.no_echo import blank, silent
 
 Array = NDArray[np.float64]
 
@@ -253,7 +253,7 @@ def lift(bodies: Any, prints: Any) -> None:
 def attend(prints: Any, bodies: Any, t: float, dt: float, scattered: Array, shoes: Array) -> None:
     """Note at which prints somebody is: whose foot stands there (owner), and when somebody was last near (busy).
 
-    ``scattered`` (3,) is what `shine.scatter` has learned, ``shoes`` (2,) what `build.count_shoes` has.
+    ``scattered`` (3,) is what `brightness.scatter` has learned, ``shoes`` (2,) what `build.count_shoes` has.
     """
     shod = shoes[0] > SHOD
     for b in range(bodies.size):

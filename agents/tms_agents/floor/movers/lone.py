@@ -134,7 +134,7 @@ def _is_two(body: Any) -> bool:
 @njit(cache=True)
 def has_walked(body: Any) -> bool:
     """Whether it has come on two feet, step by step."""
-    return bool(body.own_pace_n >= _STEPS and body.both >= _both_feet(body))
+    return bool(body.own_stance_n >= _STEPS and body.both >= _both_feet(body))
 
 
 @njit(cache=True)

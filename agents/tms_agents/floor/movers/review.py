@@ -17,7 +17,7 @@ from tms_agents.floor.movers.pair import is_pair
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, clear
 from tms_agents.floor.scan.masks import distance
-from tms_agents.floor.scan.silence import vacant
+from tms_agents.floor.scan.no_echo import vacant
 
 Array = NDArray[np.float64]
 

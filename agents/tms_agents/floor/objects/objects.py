@@ -149,7 +149,7 @@ class Objects:
     def ripe(self, prints: Any, bodies: Any, t: float, scattered: Array, intact: bool = False) -> list[tuple[int, int]]:
         """Prints that rest, and what each is: `ripening.OBJECT` or `FURNITURE`.
 
-        ``scattered`` (3,) is what `shine.scatter` has learned; ``intact``: nothing has gone from the room.
+        ``scattered`` (3,) is what `brightness.scatter` has learned; ``intact``: nothing has gone from the room.
         """
         if has_robot(bodies):
             self.robot_at = t

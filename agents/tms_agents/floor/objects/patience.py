@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tms_agents.floor.feet.brightness import strangeness
 from tms_agents.floor.feet.left_feet import has_left
 from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.prints import HARDLY
-from tms_agents.floor.feet.shine import strangeness
 from tms_agents.floor.norm import norm
 
 #: What may be a foot is watched for so long (s): most people move one within this time.
@@ -39,7 +39,7 @@ _LEFT_S, _BRINGS_S, _BRINGS_M = 1.0, 3.0, 1.0
 def patience(q: Any, bodies: Any, t: float, scattered: NDArray[np.float64]) -> float:
     """For how long (s) a print that seems to be a thing has to rest, given the ``bodies`` (n,) there are.
 
-    ``scattered`` (3,) is what `shine.scatter` has learned.
+    ``scattered`` (3,) is what `brightness.scatter` has learned.
     """
     hardly = q.hits > HARDLY * q.whole and q.mutes < _MUTES
     if q.given:

@@ -36,7 +36,7 @@ def recognize(bodies: Any, least: float, most: float) -> int:
             body.lone = 0.0
             continue
         # Far away it fell apart, as if into two feet, but took no steps.
-        rigid = body.both < 0.1 * body.hits or (body.own_pace_n < _STEPS and body.pushed < _BESIDE)
+        rigid = body.both < 0.1 * body.hits or (body.own_stance_n < _STEPS and body.pushed < _BESIDE)
         alone = body.pushed < _ALONE and body.from_furniture <= 0 and rigid
         if body.wide < 0.6 or body.hits < _HITS or not alone or not least - _MARGIN_M < body.far < most + _MARGIN_M:
             continue

@@ -7,8 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.scan.components import SIGMA_M, SIGMA_PER_M, adopt
-from tms_agents.floor.scan.faint import FAINT, LATER_S, believe
 from tms_agents.floor.scan.returning import GONE_S, whole
+from tms_agents.floor.scan.weak_echoes import FAINT, LATER_S, believe
 from tms_agents.floor.settings import FloorSettings
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ BLANK = np.zeros(1, CLUSTER)
 class ClusteredScan(NamedTuple):
     """What a scan whose first beam was measured at ``t`` shows, for kernels.
 
-    ``clusters`` (m,) of `CLUSTER`; ``of`` (m,) the print of each, -1: none; ``marks`` (m, 4) of `shine.measure`;
+    ``clusters`` (m,) of `CLUSTER`; ``of`` (m,) the print of each, -1: none; ``marks`` (m, 4) of `brightness.measure`;
     ``prints`` (p,) of `state.PRINT`. ``blank`` is `BLANK`: a kernel cannot have it of its own.
     """
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tms_agents.floor.association.identity import christen, likeness, renamed, unite
+from tms_agents.floor.feet.brightness import expected, learn
 from tms_agents.floor.feet.build import beat, size_up
-from tms_agents.floor.feet.nobodys import costs
-from tms_agents.floor.feet.shine import expected, learn
+from tms_agents.floor.feet.clutter import costs
 from tms_agents.floor.scan.clustered import ClusteredScan
 from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
@@ -94,7 +94,7 @@ def test_who_is_found_again_may_be_one_of_those_beside() -> None:
 
 def test_who_is_not_known_yet_is_like_anybody() -> None:
     bodies, _ = people((7.4, 0.6), (6.9, 0.7))
-    bodies["own_n"][1] = bodies["own_pace_n"][1] = 0
+    bodies["own_n"][1] = bodies["own_stance_n"][1] = 0
     assert likeness(bodies[0], bodies[1], expected()) == 0.0
     assert likeness(bodies[1], bodies[0], expected()) < -2.0
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tms_agents.floor import Sensor
-from tms_agents.floor.feet.build import SHOD, SHOES, agree, astray, count_shoes, from_side, legs, size_up, sole
+from tms_agents.floor.feet.build import SHOD, SHOES, agree, astray, count_shoes, from_side, legs, shoe_length, size_up
 from tms_agents.floor.feet.gait import middle
 from tms_agents.floor.scan.background import BACKGROUND, FOREGROUND
 from tms_agents.floor.scan.rays import rays
@@ -59,14 +59,14 @@ def test_a_shoe_is_as_long_as_it_is_from_wherever_its_side_is_seen_and_points_al
     seen = shoe(length, heading)
     assert from_side(seen)
     # Aslant, one beam that just hits the tip or just misses it is worth 2 cm.
-    assert abs(sole(seen) - length) < 0.04
+    assert abs(shoe_length(seen) - length) < 0.04
     assert astray(going(heading), seen) == pytest.approx(astray(going(heading + math.pi), seen), abs=1e-9)
     assert astray(going(heading), seen) < 0.3
 
 
 def test_over_all_the_ways_a_shoe_may_point_its_length_is_off_by_less_than_a_beam_is_wide() -> None:
     away = math.atan2(AT[1] - SENSOR.pose[1], AT[0] - SENSOR.pose[0])
-    off = [sole(shoe(0.27, away + across)) - 0.27 for across in np.linspace(0.7, math.pi - 0.7, 60)]
+    off = [shoe_length(shoe(0.27, away + across)) - 0.27 for across in np.linspace(0.7, math.pi - 0.7, 60)]
     beam = math.dist(AT, SENSOR.pose[:2]) * STEP[0]
     assert np.sqrt(np.mean(np.square(off))) < beam
     assert abs(np.mean(off)) < 0.5 * beam
@@ -80,7 +80,7 @@ def test_a_shoe_seen_from_its_tip_or_half_hidden_tells_no_length() -> None:
     body = going(away + 1.5)
     size_up(body, hidden)
     assert not from_side(hidden)
-    assert body["sole_n"] == 0
+    assert body["shoe_length_n"] == 0
 
 
 @pytest.mark.parametrize(("turned", "speed", "learned"), [(0.0, 1.0, True), (1.2, 1.0, False), (0.0, 0.2, False)])
@@ -89,8 +89,8 @@ def test_lengths_are_learned_of_who_walks_the_way_his_shoe_points(turned: float,
     body = going(heading + turned, speed)
     for _ in range(5):
         size_up(body, shoe(0.28, heading))
-    assert (body["sole_n"] == 5) == learned
-    assert not learned or body["own_sole"] == pytest.approx(0.28, abs=0.02)
+    assert (body["shoe_length_n"] == 5) == learned
+    assert not learned or body["own_shoe_length"] == pytest.approx(0.28, abs=0.02)
 
 
 @pytest.mark.parametrize(("sure", "learned"), [(1.0, True), (0.3, False)])
@@ -98,8 +98,8 @@ def test_what_is_known_of_a_name_is_learned_while_it_is_sure(sure: float, learne
     body = going(2.3)
     body["sure"] = sure
     size_up(body, shoe(0.28, 2.3))
-    assert body["sole_n"] == 1
-    assert (body["own_sole_n"] == 1) == learned
+    assert body["shoe_length_n"] == 1
+    assert (body["own_shoe_length_n"] == 1) == learned
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,11 @@ import pytest
 from floor_prints import shows
 
 from tms_agents.floor import FloorEstimator, Scene, Sensor
+from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.feet.left_feet import take_back
 from tms_agents.floor.feet.likelihood import feet
 from tms_agents.floor.feet.one_foot import UNLIKELY
 from tms_agents.floor.feet.prints import attend
-from tms_agents.floor.feet.shine import expected
 from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, PRINT, empty
 from tms_agents.simulation.floor_world import FloorWorld

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from floor_prints import shows
 
+from tms_agents.floor.feet.clutter import costs, goes_on
 from tms_agents.floor.feet.likelihood import feet
-from tms_agents.floor.feet.nobodys import costs, goes_on
 from tms_agents.floor.scan.segmentation import CLUSTER, FADES
 from tms_agents.floor.state import BODY, PRINT, empty
 

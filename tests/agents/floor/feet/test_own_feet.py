@@ -9,8 +9,8 @@ import pytest
 from floor_rooms import WALLS, Circle, Room, cast, walker
 
 from tms_agents.floor import Appeared, FloorEstimator, FloorEvent, FloorSettings
+from tms_agents.floor.feet.brightness import expected, note
 from tms_agents.floor.feet.own_feet import exchange
-from tms_agents.floor.feet.shine import expected, note
 from tms_agents.floor.objects.objects import Objects
 from tms_agents.floor.objects.ripening import OBJECT
 from tms_agents.floor.scan.segmentation import CLUSTER

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tms_agents.floor.events import Vanished
-from tms_agents.floor.feet.shine import expected
+from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.movers.absent import Absent
 from tms_agents.floor.scan.masks import Area
 from tms_agents.floor.state import BODY, CONCEALED, PRINT, SEATED, empty

@@ -24,7 +24,7 @@ from tms_agents.floor.state import BODY, PRINT, empty
 NOW = 100.0
 #: A laser at the origin that looks along x and sees walls 8 m away.
 OPEN = (np.full(101, 8.0), np.full(101, BACKGROUND, np.int8), np.full(101, 8.0), np.zeros(3), -0.5, 0.01)
-LEGS, SHOES = {"own_girth_n": 100}, {"own_sole_n": 20}
+LEGS, SHOES = {"own_leg_width_n": 100}, {"own_shoe_length_n": 20}
 
 
 @pytest.mark.timeout(600)  # the estimator compiles where it never ran before
@@ -63,7 +63,7 @@ def stays(
     scene = Scene(region=[(0.0, -4.0), (9.0, -4.0), (9.0, 4.0), (0.0, 4.0)], gates=[])
     one = Tracks(Association(3, 4), FloorSettings(), scene)
     body = one.bodies[0]
-    known = {"used": 1, "confirmed": 1, "label": 1, "hits": 900, "looks": 900, "both": 400, "own_pace_n": 20}
+    known = {"used": 1, "confirmed": 1, "label": 1, "hits": 900, "looks": 900, "both": 400, "own_stance_n": 20}
     seen = {"width": 0.1, "far": 0.4, "quality": 1.0, "suspected": -1e9, "a_print": 2, "b_print": 3, "first": 10.0}
     place = {
         "x0": 4.0,
@@ -227,7 +227,7 @@ def test_another_part_of_it_is_not_somebody(began: float, seconds: float, learne
 
 
 def test_who_is_told_at_it_and_was_never_known_vanishes() -> None:
-    one = stays(0, 1.0, own_pace_n=0, hits=90, both=10)
+    one = stays(0, 1.0, own_stance_n=0, hits=90, both=10)
     one.bodies["far"], one.bodies["hits"] = 0.03, 150
     body = one.bodies[0]
     body["seen"] = body["a_seen"] = body["b_seen"] = NOW + 1.1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.feet.prints import ALONE, UNLIKE, attend
-from tms_agents.floor.feet.shine import expected
 from tms_agents.floor.movers.lone import count_lone
 from tms_agents.floor.state import BODY, PRINT, empty
 
@@ -23,7 +23,7 @@ def counted(other: dict[str, float] | None = None, **fields: float) -> float:
     He came step by step; ``other`` is somebody else.
     """
     bodies = empty(BODY, 2)
-    values = {"used": 1, "confirmed": 1, "seen": NOW, "hits": 900, "both": 400, "own_pace_n": 20, "width": 0.1}
+    values = {"used": 1, "confirmed": 1, "seen": NOW, "hits": 900, "both": 400, "own_stance_n": 20, "width": 0.1}
     values |= {"a_seen": NOW, "a_since": NOW - 9.0, "a_print": 0, "b_seen": NOW - 5.0, "b_print": -1, "by": 0.6}
     values |= {"a_land": NOW - 9.0, "b_land": NOW - 6.0, "first": NOW - 60.0}
     for name, value in (values | fields).items():
@@ -46,7 +46,7 @@ def test_who_was_in_sight_all_the_time_is_still_there() -> None:
     [
         {"a_since": NOW - 2.0},  # he was out of sight for three seconds
         {"by": 1.2},  # nobody leaves a foot so far behind
-        {"own_pace_n": 0},  # he has hardly walked
+        {"own_stance_n": 0},  # he has hardly walked
         {"b_seen": -1e9},  # he was found to be nowhere before
     ],
 )

@@ -31,7 +31,7 @@ def feet(body: np.void, apart: float, landed_s: float) -> None:
 def beside(body: np.void, x: float, both: bool) -> None:
     """Somebody known who stands at (x, 0), ``both`` feet seen or one."""
     values = {"used": 1, "confirmed": 1, "label": 1, "x": x, "x0": 8.0, "ax": x, "bx": x, "by": 0.2, "told_x": x}
-    values |= {"hits": 900, "looks": 900, "both": 400, "own_pace_n": 20, "quality": 1.0, "first": 10.0}
+    values |= {"hits": 900, "looks": 900, "both": 400, "own_stance_n": 20, "quality": 1.0, "first": 10.0}
     values |= {"width": 0.1, "far": 0.12}
     values |= {"rest_x": x, "rest_at": NOW, "a_print": 2, "b_print": 3 if both else -1, "suspected": -1e9}
     values |= {"b_seen": NOW, "a_since": NOW - 9.0, "b_since": NOW - 9.0, "a_land": NOW - 9.0, "b_land": NOW - 9.0}

@@ -29,7 +29,7 @@ def at(one: Tracks, t: float) -> list:
 
 def stander(body: np.void, since: float, **fields: float) -> None:
     """Somebody, known for long, of whom one foot stands at (4, 0) ``since``; the other was seen beside it just then."""
-    values = {"used": 1, "confirmed": 1, "label": 1, "seen": NOW, "hits": 900, "both": 400, "own_pace_n": 20}
+    values = {"used": 1, "confirmed": 1, "label": 1, "seen": NOW, "hits": 900, "both": 400, "own_stance_n": 20}
     values |= {"x": 4.0, "ax": 4.0, "bx": 4.0, "by": 0.3, "told_x": 4.0, "rest_x": 4.0, "rest_at": since}
     values |= {"width": 0.1, "far": 0.12, "quality": 1.0, "first": 10.0, "suspected": -1e9, "x0": 8.0}
     values |= {"own": 7.0, "own_n": 200}

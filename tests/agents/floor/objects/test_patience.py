@@ -6,7 +6,7 @@ import pytest
 
 from tms_agents.floor import FloorSettings
 from tms_agents.floor.events import Appeared
-from tms_agents.floor.feet.shine import expected
+from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.objects.objects import Objects
 from tms_agents.floor.objects.patience import patience
 from tms_agents.floor.objects.ripening import OBJECT

@@ -7,7 +7,7 @@ import pytest
 from floor_prints import NOW, resting
 
 from tms_agents.floor import Appeared, FloorSettings
-from tms_agents.floor.feet.shine import expected
+from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.objects.objects import Objects
 from tms_agents.floor.objects.ripening import FURNITURE, OBJECT, joins
 from tms_agents.floor.state import BODY, THING, empty

@@ -25,13 +25,13 @@ def test_what_always_was_one_wide_thing_is_a_robot() -> None:
 
 @pytest.mark.parametrize("steps", [0, 1])
 def test_what_fell_apart_from_afar_and_took_no_steps_is_one_too(steps: int) -> None:
-    assert looks_like_a_robot(both=20, own_pace_n=steps)
+    assert looks_like_a_robot(both=20, own_stance_n=steps)
 
 
 @pytest.mark.parametrize(
     "fields",
     [
-        {"own_pace_n": 4},  # it has walked: somebody who stands beside a cabinet
+        {"own_stance_n": 4},  # it has walked: somebody who stands beside a cabinet
         {"pushed": 0.3},  # somebody went beside it
         {"from_furniture": 1},
         {"x": 2.5},  # it has not gone far

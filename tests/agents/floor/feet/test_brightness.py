@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tms_agents.floor.feet.shine import expected, learn, measure, scatter, unlike
+from tms_agents.floor.feet.brightness import expected, learn, measure, scatter, unlike
 from tms_agents.floor.scan.segmentation import CLUSTER
 from tms_agents.floor.state import BODY, empty
 

@@ -21,7 +21,7 @@ _LOOKS_S, _GATES_S = 2.0, 10.0
 _NEAR_M, _APART_M = 0.1, 0.1
 
 
-class Outlook:
+class Coverage:
     """Tells the ``doors`` of the ``scene`` what the lasers see."""
 
     def __init__(self, scene: Scene, doors: Doors) -> None:
