@@ -20,6 +20,7 @@ from floor_rig import (
     OUTLINE,
     PUT_AT,
     QUICK,
+    STOPS,
     WIDTH,
     Room,
     config_toml,
@@ -73,6 +74,10 @@ class Bench:
 
 def kinds(observations):
     return [type(one) for one in observations if not isinstance(one, LabelMoved)]
+
+
+def kinds_of(kind, observations):
+    return [one for one in observations if isinstance(one, kind)]
 
 
 def test_two_lasers_see_one_walker_and_one_thing(tmp_path):
@@ -145,6 +150,24 @@ def test_upside_down(tmp_path):
     bench.room.put("thing", *PUT_AT)
     (appeared,) = bench.run(4.0, scan=scan)
     assert math.dist(appeared.xy, PUT_AT) < 0.03
+
+
+def test_somebody_of_whom_nothing_is_seen_any_more_is_in_every_inventory_until_the_leaving_is_told(tmp_path):
+    """As after a line was cut, and after a restart: who must be somewhere in the room has not left."""
+    bench = Bench(tmp_path, {"south": SOUTH})
+    bench.run(COMES)
+    (entered,) = kinds_of(MoverEntered, bench.run(STOPS - COMES, lambda t: story(bench.room, t + COMES)))
+    bench.run(1.5)
+    bench.room.leave("walker")  # in the middle of the room
+    assert kinds(bench.run(5.0)) == []
+    state = json.loads(json.dumps(bench.floor.to_dict()))
+    for floor in (bench, Bench(tmp_path, {"south": SOUTH}, state, bench.now + 1.0)):
+        (told,) = floor.floor.inventory().labels
+        assert (told.label, told.kind) == (entered.label, "mover")
+        assert [one.stale for one in floor.floor.seen()] == [True]
+        (left,) = kinds_of(MoverLeft, floor.run(70.0))
+        assert left.label == entered.label
+        assert floor.floor.inventory().labels == []
 
 
 @pytest.fixture
