@@ -126,6 +126,15 @@ async def test_nobody_answers():
     assert state == DeviceState("faulty", "floor: no answer to QT, in no version of SCIP")
 
 
+async def test_a_refused_question_says_why():
+    device = sensor("UST-20LX")
+    device.refuse["PP"] = "0L"
+    async with on_a_line("tcp", device) as (_, opener):
+        (state,) = await until(link(opener), lambda seen: True, timeout_s=TIMEOUT_S)
+    why = "floor: PP: status 0L abnormal state; its state: sensor is working normally"
+    assert state == DeviceState("faulty", why)
+
+
 @contextlib.asynccontextmanager
 async def serial_line(model: str, baud: int) -> AsyncIterator[tuple[ScipDevice, PtyLine]]:
     """A sensor on a line whose speed counts: the terminal tells what the host has set."""

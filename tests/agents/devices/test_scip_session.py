@@ -220,7 +220,8 @@ def test_a_sensor_that_says_nothing():
     [
         ({"QT": "0I"}, "QT: status 0I waits for new firmware"),
         ({"QT": "0L"}, "does not become quiet"),
-        ({"PP": "0E"}, "does not tell its parameters .PP.: DMIN is missing"),
+        ({"PP": "0E"}, "PP: status 0E undefined command; its state: sensor is working"),
+        ({"PP": "0L"}, "PP: status 0L abnormal state; its state: sensor is working"),
         ({"MD": "04", "ME": "04"}, "MD: status 04 last step is out of range; its state: sensor is working"),
         ({"MD": "0M", "ME": "0M"}, "answers but sends no scans"),
         ({"ME": "52"}, "ME: status 52 hardware fault"),

@@ -171,9 +171,13 @@ class ScipSession(Outgoing):
 
     def _learn(self) -> _Course:
         why, self._parameters = "no answer", None
+        refused: Reply | None = None
         for _ in range(_MOST_TRIES):
             reply = yield _Ask("PP", self._reply_s)
             if reply is None:
+                continue
+            refused = reply if reply.status != st.OK else None
+            if refused is not None:
                 continue
             try:
                 self._parameters = Parameters.parse(reply.lines)
@@ -181,6 +185,8 @@ class ScipSession(Outgoing):
                 why = str(error)
             if self._parameters is not None and self._parameters.modl:  # a damaged line is left out
                 break
+        if self._parameters is None and refused is not None:
+            yield from self._refused(refused)
         if self._parameters is None:
             raise DeviceFault(f"the sensor does not tell its parameters (PP): {why}")
         if "PROD" not in self.about:  # only once: a URG-04LX that is asked often falls silent
