@@ -136,9 +136,11 @@ class Floor:
             given = self.lasers[name]
             if (x, y, theta) != given.pose or scale != (given.section.range_scale or 1.0):
                 self._placed.add(name)
-                where = f"it stands at x = {x:.3f}, y = {y:.3f}, theta = {theta:.4f}"
-                longer = 100 * (1 / scale - 1)
-                log.info("laser %s: as the room tells, %s and measures %+.1f %% too long", name, where, longer)
+                told = f"it stands at x = {x:.3f}, y = {y:.3f}, theta = {theta:.4f}"
+                longer = f"{100 * (1 / scale - 1):+.1f}"
+                if float(longer):  # most lasers only stand elsewhere
+                    told += f" and measures {longer} % too long"
+                log.info("laser %s: as the room tells, %s", name, told)
 
     def _knows(self, laser: str, t: float, sweep: Sweep) -> bool:
         """Whether the estimator knows this laser; it begins when all have told how they sweep, or the first waited."""

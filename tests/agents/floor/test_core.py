@@ -124,19 +124,23 @@ def test_the_live_picture_shows_walls_where_they_are_though_the_laser_errs(tmp_p
     assert np.median(off) < 0.02 and off.max() < 0.05
 
 
-def test_it_is_said_once_that_a_laser_stands_elsewhere_than_is_given(tmp_path, caplog):
+@pytest.mark.parametrize(("error", "too_long"), [(0.0, ""), (0.006, " and measures +0.6 % too long")])
+def test_it_is_said_once_that_a_laser_stands_or_measures_otherwise_than_is_given(tmp_path, caplog, error, too_long):
     caplog.set_level(logging.INFO)
     bench = Bench(tmp_path, {"south": SOUTH})
+    bench.room = Room(noise_m=0.001)
     told = bench.floor.config.model_copy(update={"scene": SceneSection(region=[*OUTLINE])})
     x, y, theta = SOUTH
     floor = Floor(told, {"south": (x + 0.03, y + 0.02, theta - 0.01)}, bench.clocks, lambda: "lab-floor/1")
     for _ in range(60):
         bench.now += 0.1
-        floor.scans("south", bench.now, [bench.room.scan(SWEEP, SOUTH, bench.now - 0.04)])
+        scan = bench.room.scan(SWEEP, SOUTH, bench.now - 0.04)
+        floor.scans("south", bench.now, [replace(scan, ranges=scan.ranges * (1 + error))])
     (line,) = [record.getMessage() for record in caplog.records if "as the room tells" in record.getMessage()]
-    assert "laser south" in line
+    assert line.startswith("laser south: as the room tells, it stands at x = ")
     numbers = [float(number) for number in re.findall(r"= (-?[0-9.]+)", line)]
     assert numbers == pytest.approx(SOUTH, abs=0.01)
+    assert line.partition(f"theta = {numbers[2]:.4f}")[2] == too_long
 
 
 def test_upside_down(tmp_path):
