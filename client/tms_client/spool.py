@@ -71,7 +71,9 @@ class Spool:
             self._open()
         except (sqlite3.Error, SpoolError) as error:
             self._db.close()
-            raise SpoolError(f"spool {path}: {error}") from error
+            busy = isinstance(error, sqlite3.Error) and error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
+            why = "an agent with this spool is running already" if busy else error
+            raise SpoolError(f"spool {path}: {why}") from error
 
     # filling
 

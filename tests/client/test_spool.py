@@ -100,7 +100,7 @@ def test_acknowledging_twice_is_harmless(tmp_path):
 
 
 def test_one_process_and_one_agent_per_file(tmp_path):
-    with Spool(tmp_path / "s", "a"), pytest.raises(SpoolError, match="locked"):
+    with Spool(tmp_path / "s", "a"), pytest.raises(SpoolError, match="an agent with this spool is running already"):
         Spool(tmp_path / "s", "a")
     with pytest.raises(SpoolError, match="belongs to agent 'a'"):
         Spool(tmp_path / "s", "b")

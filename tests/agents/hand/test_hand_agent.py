@@ -108,6 +108,14 @@ def test_a_full_spool_is_said(town, room, configure, tmp_path, capsys):
     assert "3 lost, 2 waiting in the spool" in capsys.readouterr().out
 
 
+def test_a_second_agent_on_the_same_spool_is_told_so(configure, capsys):
+    config = configure({"kind": "tr3-serial", "device": "/dev/null"})
+    read = read_config(config, HandConfig)
+    with Spool(read.spool.path, read.agent):
+        assert cli.main(["agent", "hand", "--config", str(config)]) == 2
+    assert capsys.readouterr().err == f"tms: spool {read.spool.path}: an agent with this spool is running already\n"
+
+
 def test_the_agent_needs_no_numeric_libraries():
     """A sensor host with the light install has no numba and no scipy; reading tags needs no numpy either."""
     block = "import sys; sys.modules.update(dict.fromkeys(('numpy', 'numba', 'scipy', 'fastapi')))"
