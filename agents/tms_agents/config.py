@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -70,8 +71,32 @@ def read_config(path: Path, model: type[C]) -> C:
     try:
         return model.model_validate(raw, context={"folder": path.resolve().parent})
     except ValidationError as error:
-        faults = (f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)[:5])
+        faults = [_in_words(one["loc"], one["msg"]) for one in error.errors(include_url=False)[:5]]
         raise CommandError(f"{path}: {'; '.join(faults)}") from error
+
+
+def misplaced(place: Sequence[str | int], why: str) -> ValidationError:
+    """For validators of a whole section: what is wrong, at its place in the section."""
+    ctx = {"error": ValueError(why)}
+    return ValidationError.from_exception_data(
+        "", [{"type": "value_error", "loc": tuple(place), "input": None, "ctx": ctx}]
+    )
+
+
+def need_names_of_their_own(what: str, names: Sequence[str]) -> None:
+    """For validators of a list of sections that have a ``name``.
+
+    Raises:
+        ValidationError: at the name that another one has already.
+    """
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise misplaced((number, "name"), f"two {what}s are called {name!r}: give each its name")
+
+
+def _in_words(place: Sequence[str | int], what: str) -> str:
+    """Where, if it is not the file as a whole, and what."""
+    return ": ".join(filter(None, (".".join(map(str, place)), what.removeprefix("Value error, "))))
 
 
 def _from_environment(raw: dict[str, Any]) -> None:

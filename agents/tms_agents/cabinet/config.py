@@ -6,14 +6,14 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, create_model, field_validator, model_validator
+from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
 
 from tms_agents.cabinet.calibration_file import BoardCalibration
 from tms_agents.cabinet.frames import BoardPose
 from tms_agents.cabinet.geometry import Geometry, Zone
 from tms_agents.cabinet.settings import EstimatorSettings
 from tms_agents.cabinet.sources import LoadSection
-from tms_agents.config import AgentConfig, LocalPath, Seconds, Section
+from tms_agents.config import AgentConfig, LocalPath, Seconds, Section, misplaced, need_names_of_their_own
 from tms_agents.readers import CaptureSource, ReaderSource, can_pause
 from tms_agents.running import Heartbeat
 from tms_schemas.base import Metres, Name, Polygon, Xy
@@ -55,6 +55,12 @@ class BoardSection(Section):
     def _one_is_a_list(cls, value: Any) -> Any:
         return [value] if isinstance(value, dict) else value
 
+    @field_validator("estimator")
+    @classmethod
+    def _known(cls, value: dict[str, float]) -> dict[str, float]:
+        _Settings.model_validate(value)
+        return value
+
     @model_validator(mode="after")
     def _possible(self) -> BoardSection:
         delivered = sum(one.cell_count for one in self.load)
@@ -63,7 +69,6 @@ class BoardSection(Section):
         if self.cells is None and delivered != 1:
             raise ValueError(f"load delivers {delivered} cells: give their positions as cells")
         self.geometry()
-        self.settings()
         return self
 
     @property
@@ -164,23 +169,26 @@ class CabinetConfig(AgentConfig):
     #: The state of the devices is posted again this often, so that a quiet agent is not taken for a dead one.
     heartbeat_s: Heartbeat = 10.0
 
+    @field_validator("boards", "readers")
+    @classmethod
+    def _named(cls, value: list[Any], info: ValidationInfo) -> list[Any]:
+        need_names_of_their_own(str(info.field_name).removesuffix("s"), [one.name for one in value])
+        return value
+
     @model_validator(mode="after")
     def _names_fit(self) -> CabinetConfig:
-        boards = [one.name for one in self.boards]
-        for what, names in (("board", boards), ("reader", [one.name for one in self.readers])):
-            if twice := sorted({name for name in names if names.count(name) > 1}):
-                raise ValueError(f"two {what}s are called {twice[0]!r}")
-        for zone in self.zones:
+        boards = {one.name for one in self.boards}
+        for number, zone in enumerate(self.zones):
             if zone.board not in boards:
-                raise ValueError(
-                    f"zone {zone.name!r}: there is no board {zone.board!r} (there are {', '.join(boards)})"
-                )
+                why = f"there is no board {zone.board!r} (there are {_list(boards)})"
+                raise misplaced(("zones", number, "board"), why)
         known = {zone.name for zone in self.zones}
-        for reader in self.readers:
+        for number, reader in enumerate(self.readers):
+            place = ("readers", number)
             if not reader.zone_names:
-                raise ValueError(f"reader {reader.name!r} needs zone or zones: what do its antennas cover?")
+                raise misplaced(place, f"reader {reader.name!r} needs zone or zones: what do its antennas cover?")
             if missing := sorted(reader.zone_names - known):
-                raise ValueError(f"reader {reader.name!r}: there is no zone {missing[0]!r} (there are {_list(known)})")
+                raise misplaced(place, f"there is no zone {missing[0]!r} (there are {_list(known)})")
         return self
 
     def board_zones(self, board: str) -> dict[str, Zone]:

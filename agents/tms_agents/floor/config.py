@@ -6,9 +6,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import Field, ValidationInfo, create_model, field_validator
 
-from tms_agents.config import AgentConfig, LocalPath, Seconds, Section
+from tms_agents.config import AgentConfig, LocalPath, Seconds, Section, need_names_of_their_own
 from tms_agents.floor.settings import FloorSettings, Pose, Scene
 from tms_agents.floor.sources import LaserSource
 from tms_agents.running import Heartbeat
@@ -61,10 +61,11 @@ class SceneSection(Section):
 
     @field_validator("*", mode="after")
     @classmethod
-    def _areas(cls, value: Any, info: ValidationInfo) -> Any:
+    def _possible(cls, value: Any, info: ValidationInfo) -> Any:
         polygons = [value] if info.field_name == "region" else value
         if info.field_name != "mirrors" and any(one is not None and _area(one) < 1e-4 for one in polygons):
             raise ValueError("a polygon without an area")
+        Scene(**{str(info.field_name): value})
         return value
 
 
@@ -106,17 +107,19 @@ class FloorConfig(AgentConfig):
     #: The state of the devices is posted again this often, so that a quiet agent is not taken for a dead one.
     heartbeat_s: Heartbeat = 10.0
 
-    @model_validator(mode="after")
-    def _fits(self) -> FloorConfig:
-        names = [one.name for one in self.lasers]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"two lasers are called {twice[0]!r}: give each its name")
-        self.room_scene()
-        self.settings()
-        return self
+    @field_validator("lasers")
+    @classmethod
+    def _named(cls, value: list[LaserSection]) -> list[LaserSection]:
+        need_names_of_their_own("laser", [one.name for one in value])
+        return value
+
+    @field_validator("estimator")
+    @classmethod
+    def _known(cls, value: dict[str, float]) -> dict[str, float]:
+        _Settings.model_validate(value)
+        return value
 
     def room_scene(self) -> Scene:
-        """Of the estimator. Raises ValueError where no room is like that."""
         one = self.scene
         return Scene(
             region=one.region,

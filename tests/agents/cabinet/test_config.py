@@ -51,12 +51,12 @@ def test_there_is_an_example_for_each_device():
         (('device = "/dev/null"}', 'host = "h"}'), "host needs port"),
         (('device = "/dev/null"}', 'device = "/dev/null", baud = 1}'), "baud: Input should be greater than or equal"),
         (("theta = ", "theta = 99, tetha = "), "boards.0.pose.theta"),
-        (('zone = "shelf"', 'zone = "shelve"'), "there is no zone 'shelve' (there are shelf)"),
-        (('zone = "shelf"\n', ""), "reader 'reader' needs zone or zones"),
-        (('board = "shelf"', 'board = "shelve"'), "there is no board 'shelve' (there are shelf)"),
-        (('[[zones]]\nname = "shelf"', '[[zones]]\nname = "shelves"'), "there is no zone 'shelf' (there are shelves)"),
-        (('surface = "cabinet/shelf"', "estimator = {settle = 1}"), "settle"),
-        (('surface = "cabinet/shelf"', "estimator = {settle_s = -1}"), "settle_s"),
+        (('zone = "shelf"', 'zone = "shelve"'), ": readers.0: there is no zone 'shelve' (there are shelf)"),
+        (('zone = "shelf"\n', ""), ": readers.0: reader 'reader' needs zone or zones"),
+        (('board = "shelf"', 'board = "shelve"'), ": zones.0.board: there is no board 'shelve' (there are shelf)"),
+        (('[[zones]]\nname = "shelf"', '[[zones]]\nname = "shelves"'), ": readers.0: there is no zone 'shelf' (there"),
+        (('surface = "cabinet/shelf"', "estimator = {settle = 1}"), ": boards.0.estimator.settle: Extra inputs"),
+        (('surface = "cabinet/shelf"', "estimator = {settle_s = -1}"), ": boards.0.estimator.settle_s: Input should"),
         (("heartbeat_s = 1.0", "heartbeat_s = 0"), "heartbeat_s: Input should be greater than 0"),
     ],
 )
@@ -69,6 +69,17 @@ def test_what_is_wrong_is_one_line(tmp_path, capsys, change, says):
         assert cli.main([*command, "--config", str(path)]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert says in line
+
+
+@pytest.mark.parametrize("what", ["board", "reader"])
+def test_two_of_one_name_are_named(tmp_path, what):
+    path = tmp_path / "cabinet.toml"
+    text = config_toml("lab", "http://127.0.0.1:9", BOARD, reader=READER)
+    head, rest = text.split(f"[[{what}s]]\n", 1)
+    own = rest.split("\n[", 1)[0] + "\n"
+    path.write_text(f"{head}[[{what}s]]\n{own}[[{what}s]]\n{rest}")
+    with pytest.raises(CommandError, match=rf": {what}s.1.name: two {what}s are called '[a-z]+': give each its name$"):
+        read_config(path, CabinetConfig)
 
 
 def test_weighing_with_the_field_off_needs_a_reader_that_can(tmp_path):

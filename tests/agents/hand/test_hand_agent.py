@@ -192,7 +192,7 @@ ROBOT = {"states": {"kind": "stdin"}}
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ({}, "give a [source], or [[hands]]"),
+        ({}, "hand.toml: give a [source], or [[hands]]"),
         ({"hands": [{"name": "a"}]}, "[[hands]] and [robot] belong together"),
         ({"robot": ROBOT, "source": {"kind": "llrp", "host": "h"}}, "[[hands]] and [robot] belong together"),
         ({"robot": ROBOT, "hands": [{"name": "a"}, {"name": "a"}]}, "two hands have the same name"),
