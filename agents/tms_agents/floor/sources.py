@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from tms_agents.config import Section
-from tms_agents.devices.cola import ColaSession
-from tms_agents.devices.lms200 import Lms200Session, serial_line
+from tms_agents.devices.cola import PASSWORDS, ColaSession
+from tms_agents.devices.lms200 import Lms200Session, Unit, serial_line
 from tms_agents.devices.scans import Scan
-from tms_agents.devices.scip import ScipLink, ScipSettings, scip_serial
+from tms_agents.devices.scip import PORT, ScipLink, ScipSettings, scip_serial
 from tms_agents.devices.transport import Link, tcp
 from tms_agents.line_config import Line
 
 _Angle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+_Degrees = Annotated[float, Field(ge=-360, le=360)]
+_Hash = Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
 
 
 class ScipLaser(Line):
@@ -30,10 +33,12 @@ class ScipLaser(Line):
     skip: Annotated[int, Field(ge=0, le=9)] = 0
     #: Ranges up to 4 m in fewer bytes, for slow serial lines.
     short: bool = False
+    #: Ask for every scan, so that a slow line is never full of old ones.
+    polled: bool = False
     #: Have the strength of the echoes sent, too, by a model that tells it: it tells people apart.
     intensity: bool = True
 
-    default_port: ClassVar[int | None] = 10940
+    default_port: ClassVar[int | None] = PORT
 
     @model_validator(mode="after")
     def _possible(self) -> ScipLaser:
@@ -42,7 +47,8 @@ class ScipLaser(Line):
 
     def _settings(self) -> ScipSettings:
         intensity: Literal["auto", "off"] = "auto" if self.intensity and not self.short else "off"
-        return ScipSettings(intensity, self.angle_min, self.angle_max, self.cluster, self.skip, self.short)
+        same = {one.name for one in fields(ScipSettings)} - {"intensity"}
+        return ScipSettings(intensity, **self.model_dump(include=same))
 
     def link(self, silent_after_s: float) -> Link[Scan]:
         opener = self.opener(115_200) if self.device is None else scip_serial(self.device, self.baud)
@@ -55,19 +61,35 @@ class LmsLaser(Section):
     kind: Literal["lms200"]
     device: str
     baud: Literal[9600, 19200, 38400, 500000] = 38400
-    #: Field of view and step in degrees; none: as the laser is set up.
-    angle_deg: Literal[100, 180] | None = 180
-    resolution_deg: Annotated[float, Field(ge=0.25, le=1)] | None = 0.5
+    #: Field of view and step in degrees.
+    angle_deg: Literal[100, 180] = 180
+    resolution_deg: Annotated[float, Field(ge=0.25, le=1)] = 0.5
+    #: A model that has one field of view and step, as the fast ones (S14): they are not set.
+    fixed: bool = False
+    #: Whole scans as they come, the same with the strength of the echoes (fast models), or each when it is asked for.
+    output: Literal["stream", "reflectivity", "request"] = "stream"
+    #: Written into the memory of the laser where they differ from what is there; none: as it is set up.
+    unit: Unit | None = None
+    measuring_mode: Annotated[int, Field(ge=0, le=0xFF)] | None = None
 
     @model_validator(mode="after")
     def _possible(self) -> LmsLaser:
-        if self.resolution_deg not in (None, 0.25, 0.5, 1.0):
+        if self.resolution_deg not in (0.25, 0.5, 1.0):
             raise ValueError(f"resolution_deg is 0.25, 0.5 or 1, not {self.resolution_deg:g}")
+        if self.fixed and not self.model_fields_set.isdisjoint(("angle_deg", "resolution_deg")):
+            raise ValueError("angle_deg and resolution_deg are not set where they are fixed")
         self._session()
         return self
 
     def _session(self) -> Lms200Session:
-        return Lms200Session(angle_deg=self.angle_deg, resolution_deg=self.resolution_deg, baud=self.baud)
+        return Lms200Session(
+            output=self.output,
+            angle_deg=None if self.fixed else self.angle_deg,
+            resolution_deg=None if self.fixed else self.resolution_deg,
+            measuring_mode=self.measuring_mode,
+            unit=self.unit,
+            baud=self.baud,
+        )
 
     def link(self, silent_after_s: float) -> Link[Scan]:
         return Link(
@@ -86,14 +108,18 @@ class ColaLaser(Section):
     port: Annotated[int, Field(ge=1, le=65535)] = 2112
     dialect: Literal["auto", "A", "B"] = "auto"
     #: The device's own angle of straight ahead, degrees.
-    forward_deg: Annotated[float, Field(ge=-360, le=360)] = 90.0
+    forward_deg: _Degrees = 90.0
     #: Set where given, models that can; a pace or a field goes with a resolution.
     frequency_hz: Annotated[float, Field(gt=0, le=200)] | None = None
     resolution_deg: Annotated[float, Field(gt=0, le=10)] | None = None
+    #: The part of the view that is sent, from and to, in the device's own angles.
+    field_deg: tuple[_Degrees, _Degrees] | None = None
     layer: Annotated[int, Field(ge=-100, le=100)] = 0
-    #: Have the strength of the echoes sent, too: it tells people apart. For that the agent logs in with the passwords
-    #: that devices come with; false: the device stays as it is set up, without login.
+    #: Have the strength of the echoes sent, too: it tells people apart. For that the agent logs in; false: the device
+    #: stays as it is set up, without login.
     intensity: bool = True
+    #: Hashes to log in with, tried in turn; those that devices come with.
+    passwords: Annotated[tuple[_Hash, ...], Field(min_length=1, max_length=10)] = PASSWORDS
 
     @model_validator(mode="after")
     def _possible(self) -> ColaLaser:
@@ -106,6 +132,8 @@ class ColaLaser(Section):
             intensities=True if self.intensity else None,
             frequency_hz=self.frequency_hz,
             resolution_deg=self.resolution_deg,
+            field_deg=self.field_deg,
+            passwords=self.passwords,
             forward_deg=self.forward_deg,
             layer=self.layer,
         )

@@ -16,6 +16,8 @@ from tms_client.cli import CommandError
 
 EXAMPLES = sorted((Path(tms_agents.floor.__file__).parent / "examples").glob("*.toml"))
 LASER = laser_toml('{ kind = "scip", device = "/dev/null" }')
+SCIP = 'kind = "scip", device = "/dev/null"'
+LMS, COLA = 'kind = "lms200", device = "/dev/null"', 'kind = "cola", host = "h"'
 SCENE = "[scene]\nregion = [[0, 0], [5, 0], [5, 4]]\nseats = [[[1, 1], [2, 1], [2, 2]]]\n"
 
 
@@ -61,6 +63,21 @@ def test_there_is_an_example_for_each_device_and_each_part_of_a_room():
             ('kind = "scip", device = "/dev/null"', 'kind = "lms200", device = "/dev/null", baud = 115200'),
             "lasers.0.source.lms200.baud",
         ),
+        ((SCIP, f"{LMS}, unit = 'inch'"), "lasers.0.source.lms200.unit: Input should be 'cm' or 'mm'"),
+        ((SCIP, f"{LMS}, measuring_mode = 7"), "lasers.0.source.lms200: measuring mode 07 measures no distances"),
+        (
+            (SCIP, f"{LMS}, output = 'partial'"),
+            "lasers.0.source.lms200.output: Input should be 'stream', 'reflectivity'",
+        ),
+        (
+            (SCIP, f"{LMS}, fixed = true, angle_deg = 180"),
+            "lms200: angle_deg and resolution_deg are not set where they",
+        ),
+        ((SCIP, f"{SCIP}, polled = 2"), "lasers.0.source.scip.polled: Input should be a valid boolean"),
+        ((SCIP, f"{COLA}, passwords = []"), "lasers.0.source.cola.passwords: Tuple should have at least 1 item"),
+        ((SCIP, f"{COLA}, passwords = ['main']"), "lasers.0.source.cola.passwords.0: Input should be a valid integer"),
+        ((SCIP, f"{COLA}, field_deg = [0, 180]"), "lasers.0.source.cola: a pace or field of view is set together with"),
+        ((SCIP, f"{COLA}, resolution_deg = 1, field_deg = [180, 0]"), "cola: a field of view goes from the smaller"),
         (
             ('kind = "scip", device = "/dev/null"', 'kind = "cola", host = "h", frequency_hz = 25'),
             "set together with a resolution",

@@ -66,6 +66,8 @@ class ColaSession(Outgoing):
             raise ValueError("a pace or field of view is set together with a resolution")
         if resolution_deg is not None and frequency_hz is None and field_deg is None:
             raise ValueError("a resolution is set together with a pace or field of view")
+        if field_deg is not None and not field_deg[0] < field_deg[1]:
+            raise ValueError("a field of view goes from the smaller angle to the larger")
         self.frames = 0
         self.ready = False
         self.tick_s = 0.05

@@ -2,6 +2,7 @@
 
 from tms_agents.devices.lms200.emulator import Lms200Device
 from tms_agents.devices.lms200.line import serial_line
+from tms_agents.devices.lms200.messages import Unit
 from tms_agents.devices.lms200.session import Lms200Session
 
-__all__ = ["Lms200Device", "Lms200Session", "serial_line"]
+__all__ = ["Lms200Device", "Lms200Session", "Unit", "serial_line"]
