@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from tms_agents.devices.beat import on_the_beat
-from tms_agents.devices.sessions import Asking, DeviceState, Noted, Paced, Polled, Prompt, Session
+from tms_agents.devices.sessions import Asking, DeviceState, Noted, Paced, Patient, Polled, Prompt, Session
 from tms_agents.devices.streams import Stream
 from tms_agents.devices.waiting import Watch, watch
 
@@ -44,6 +44,7 @@ class Conversation(Generic[T]):
         self._session, self._stream, self._alive, self._silence = session, stream, alive, silence
         self._tick_s, self._gather_s = tick_s, gather_s
         self._paced = session if isinstance(session, Paced) else None
+        self._patient = session if isinstance(session, Patient) else None
         self._polled = isinstance(session, Polled)
         self._prompt: Prompt[T] | None = session if isinstance(session, Prompt) else None
         self._asking: Asking[T] | None = session if isinstance(session, Asking) else None
@@ -149,7 +150,9 @@ class Conversation(Generic[T]):
             if session.ready and (not self._well or (self._noted is not None and self._noted.note != self._note)):
                 self._well, self._note = True, "" if self._noted is None else self._noted.note
                 self._tell(self._alive())
-        elif states := self._silence(now - self._alive_at):
+        elif (self._patient is None or now - self._alive_at > self._patient.quiet_s) and (
+            states := self._silence(now - self._alive_at)
+        ):
             self._well = False
             self._tell(states)
         if items:

@@ -55,6 +55,18 @@ class Paced(Protocol):
 
 
 @runtime_checkable
+class Patient(Protocol):
+    """A session that knows how long a device may say nothing, and says itself what is missing then."""
+
+    @property
+    def quiet_s(self) -> float:
+        """At present no silence up to so long, since the last frame or the opening, is worth a word of the link.
+
+        Asked again at every look; 0 where the link is to judge.
+        """
+
+
+@runtime_checkable
 class Noted(Protocol):
     """A session that has something to add to the state of a device that works: what it is, what it complains of."""
 

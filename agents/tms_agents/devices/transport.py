@@ -14,7 +14,7 @@ from collections.abc import AsyncGenerator, Callable, Sequence
 from typing import Generic, Literal, TypeVar
 
 from tms_agents.devices.conversation import Conversation
-from tms_agents.devices.sessions import DeviceFault, DeviceState, Noted, Paced, Polled, Session
+from tms_agents.devices.sessions import DeviceFault, DeviceState, Noted, Paced, Patient, Polled, Session
 from tms_agents.devices.streams import Opener, Stream, serial, tcp
 from tms_client.flows import Retry
 
@@ -26,6 +26,7 @@ __all__ = [
     "Noted",
     "Opener",
     "Paced",
+    "Patient",
     "Polled",
     "Session",
     "Stream",

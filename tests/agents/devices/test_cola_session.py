@@ -101,11 +101,15 @@ def test_what_is_not_to_be_changed_needs_no_login():
     scans = converse(host, device, clock, 1.0)
     assert scans and scans[0].intensities is None
     assert not [name for name in device.heard if name.startswith(("sMN", "sWN"))]
+    with pytest.raises(DeviceFault, match="needs a login"):
+        pair(passwords=())
 
 
 def test_pace_resolution_and_field_of_view():
     clock, device, host = pair("LMS111", frequency_hz=25, resolution_deg=0.25)
     device.room = Room(1081)
+    device.settle_s = 10.0
+    assert converse(host, device, clock, 10.0) == []
     scans = converse(host, device, clock, 2.0)
     assert len(scans[0].ranges) == 1081 and scans[0].sweep.period_s == pytest.approx(0.04)
     assert_true(scans, device.room)
@@ -125,6 +129,8 @@ def test_pace_resolution_and_field_of_view():
     clock, device, host = pair("TiM571", frequency_hz=25, resolution_deg=0.5)
     with pytest.raises(DeviceFault, match="refuses sMN mLMPsetscancfg: error 2: unknown method"):
         converse(host, device, clock, 2.0)
+    clock, device, host = pair("TiM571", frequency_hz=15, resolution_deg=0.3333, intensities=None, passwords=())
+    assert converse(host, device, clock, 2.0)  # as it is: nothing to change, nothing to log in for
     with pytest.raises(ValueError, match="together with a resolution"):
         ColaSession(frequency_hz=25)
     with pytest.raises(ValueError, match="together with a pace or field of view"):
@@ -306,6 +312,30 @@ async def test_a_refusal_is_the_state_of_the_link():
         (state,) = await until(link, lambda seen: states(seen), timeout_s=20)
     why = "floor: TiM571-2050101 V3.13 refuses sEN LMDscandata: error 15: unknown event"
     assert state == DeviceState("faulty", why)
+
+
+async def test_a_mirror_that_takes_its_time_to_another_pace_is_waited_for_and_not_set_again():
+    device = ColaDevice(Room(541), model=MODELS["LMS111"])
+    device.settle_s = 6.0
+    async with on_a_line("tcp", device, tick_s=0.01) as (port, opener):
+
+        def hang_up(item):
+            if isinstance(item, Scan) and device.heard.count("sRN DeviceIdent") == 1:
+                port.hang_up()
+
+        link = Link(
+            opener,
+            lambda: ColaSession(frequency_hz=25, resolution_deg=0.5),
+            name="floor",
+            silent_after_s=1.0,
+            retry=QUICK,
+        )
+        seen = await until(
+            link, lambda seen: "faulty" in states(seen) and isinstance(seen[-1], Scan), hang_up, timeout_s=20
+        )
+    assert states(seen) == ["connected", "faulty", "connected"]
+    assert all(scan.sweep.period_s == pytest.approx(0.04) for scan in seen if isinstance(scan, Scan))
+    assert device.heard.count("sMN mLMPsetscancfg") == 1
 
 
 async def test_pollution_is_told_with_the_state_while_it_goes_on():

@@ -54,7 +54,8 @@ class ColaDevice:
 
     Faults: ``silent``; ``garble_next`` and ``cut_next`` count telegrams that arrive with a wrong byte, or without their
     second half; ``power_cycle()``; ``refuse`` holds names and the error number they are refused with; ``unknown`` are
-    names that are not answered at all; ``status`` and ``state`` are what it tells of itself.
+    names that are not answered at all; ``status`` and ``state`` are what it tells of itself. For ``settle_s`` after a
+    pace was set its mirror comes to it, and no scan is sent.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class ColaDevice:
     ) -> None:
         self.model, self.dialect, self._scan, self._clock = model, dialect, scan, clock
         self.silent = False
+        self.settle_s = 0.0
         self.garble_next = self.cut_next = 0
         self.refuse: dict[str, int] = {}
         self.unknown: set[str] = set()
@@ -85,6 +87,7 @@ class ColaDevice:
         self._rssi_bits: int = 0
         self._parser = FrameParser()
         self._started, self._due, self._scans = self._clock(), -math.inf, 0
+        self._settled = -math.inf
 
     @property
     def beams(self) -> int:
@@ -105,7 +108,7 @@ class ColaDevice:
 
     def tick(self) -> bytes:
         """The scans that are due by its clock."""
-        if not self.streaming or self._clock() < self._due:
+        if not self.streaming or self._clock() < max(self._due, self._settled):
             return b""
         self._due = max(self._due + 1 / self.scan_hz, self._clock() - 1 / self.scan_hz)
         scan = self._send(self._measured().telegram(self.dialect))
@@ -204,6 +207,7 @@ class ColaDevice:
         result = 1 if hz not in (25, 35, 50, 75, 100) else 2 if step not in (1667, 2500, 3333, 5000, 6667, 10000) else 0
         if result == 0:
             self.scan_hz, self.step_deg = hz, degrees_of_step(step)
+            self._settled = self._clock() + self.settle_s
         writer.put("B", result).put("I", round(100 * self.scan_hz)).put("H", 1).put("I", round(1e4 * self.step_deg))
         return writer.put("i", round(1e4 * self.start_deg), round(1e4 * self.stop_deg))
 

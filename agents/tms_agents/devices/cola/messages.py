@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tms_agents.devices.cola.framing import Dialect, Telegram
 from tms_agents.devices.cola.scandata import NAME
@@ -93,6 +94,29 @@ def content(intensities: bool, *, bits: int = 16) -> Command:
     return _command("sWN", "LMDscandatacfg", values, optional=False)
 
 
+class ScanConfig(NamedTuple):
+    """Pace, resolution and field of view, in the units of the device: hundredths of a hertz, 1/10,000 degrees."""
+
+    frequency: int
+    resolution: int
+    start: int
+    stop: int
+
+    @classmethod
+    def of(cls, reader: Reader) -> ScanConfig:
+        """Of an answer to ``LMPscancfg``. Raises: ValueError."""
+        frequency, _, resolution = reader.integer("I"), reader.integer("H"), reader.integer("I")
+        return cls(frequency, resolution, reader.integer("i"), reader.integer("i"))
+
+    def scans(self, frequency_hz: float, resolution_deg: float) -> bool:
+        """Whether it is that pace and resolution, of which thirds and sixths are cut off or rounded."""
+        return self.frequency == round(100 * frequency_hz) and abs(self.resolution - 10_000 * resolution_deg) < 2
+
+    @property
+    def field_deg(self) -> tuple[float, float]:
+        return self.start / 10_000, self.stop / 10_000
+
+
 def scan_config(frequency_hz: float, resolution_deg: float, start_deg: float, stop_deg: float) -> Command:
     """Pace and resolution; models other than LMS1xx and LMS5xx do not know it."""
 
@@ -101,12 +125,6 @@ def scan_config(frequency_hz: float, resolution_deg: float, start_deg: float, st
         return writer.put("i", round(10_000 * start_deg), round(10_000 * stop_deg))
 
     return _command("sMN", "mLMPsetscancfg", values, optional=False)
-
-
-def field_of(reader: Reader) -> tuple[float, float]:
-    """Start and stop angle in degrees, of an answer to ``LMPscancfg``. Raises: ValueError."""
-    reader.integer("I"), reader.integer("H"), reader.integer("I")  # pace, sectors, resolution
-    return reader.integer("i") / 10_000, reader.integer("i") / 10_000
 
 
 def output_range(resolution_deg: float, start_deg: float, stop_deg: float) -> Command:

@@ -17,6 +17,8 @@ from tms_agents.devices.scans import Scan
 from tms_agents.devices.sessions import DeviceFault
 
 _REPLY_S, _METHOD_S, _REPEATS = 1.0, 3.0, 1
+#: The first question, until there is an answer in one of the dialects.
+_FIRST_REPEATS = 5
 #: So many starts, or damaged scans, in a row without a good scan between them are a fault.
 _MAX_STARTS, _MAX_DAMAGED = 3, 5
 _CLOCK_BITS = 32
@@ -24,6 +26,8 @@ _CLOCK_BITS = 32
 _IDLE_S = 0.3
 #: How long the mirror may take to come to another pace.
 _NEW_PACE_S = 15.0
+#: The session says what is missing before the link says that something is.
+_MARGIN_S = 1.0
 _SCAN_CONFIG_RESULTS = (
     "",
     "that pace is not possible",
@@ -76,12 +80,14 @@ class ColaSession(Outgoing):
         self._intensities, self._frequency_hz = intensities, frequency_hz
         self._resolution_deg, self._field_deg = resolution_deg, field_deg
         self._passwords, self._forward_deg, self._layer = tuple(passwords), forward_deg, layer
-        self._silence_s = self._patience_s = silence_s
+        self._silence_s = silence_s
         self._clock, self._parser = clock, FrameParser()
         self._commands: deque[Command] = deque()
         self._current: Command | None = None
         self._since = self._heard_at = clock()
         self._tries = self._starts = self._damaged = self._login = 0
+        #: Whether the mirror is on its way to another pace, for all that is known.
+        self._new_pace = False
         self._found = False
         self._turns = _Unwrapped()
 
@@ -89,6 +95,13 @@ class ColaSession(Outgoing):
     def dialect(self) -> Dialect:
         """The dialect in use."""
         return self._dialects[0]
+
+    @property
+    def quiet_s(self) -> float:
+        """An answer is waited for, and asked for again; a mirror that comes to another pace sends no scans."""
+        if self._current is not None:
+            return (1 + self._repeats) * _patience_s(self._current) + _MARGIN_S
+        return _NEW_PACE_S + _MARGIN_S if self._new_pace else 0.0
 
     @property
     def note(self) -> str:
@@ -110,7 +123,7 @@ class ColaSession(Outgoing):
         if self._current is not None:
             if now - self._since > _patience_s(self._current):
                 self._unanswered(self._current)
-        elif now - self._since > self._patience_s:
+        elif now - self._since > (_NEW_PACE_S if self._new_pace else self._silence_s):
             self._start()
 
     def closing(self) -> bytes:
@@ -125,21 +138,25 @@ class ColaSession(Outgoing):
         self._starts += 1
         if self._starts > _MAX_STARTS:
             raise DeviceFault(f"{self.model or 'the scanner'} answers, but sends no scans")
-        self._current, self._login = None, 0
-        self._patience_s = self._silence_s if self._frequency_hz is None else max(self._silence_s, _NEW_PACE_S)
+        self._current, self._login, self._new_pace = None, 0, False
         # what was subscribed to before would answer in between
         self._commands = deque([m.read("SCdevicestate"), m.stream(False, optional=True), m.read("DeviceIdent")])
-        self._commands += [m.read("SerialNumber"), *self._set_up(), m.stream(True)]
+        self._commands.append(m.read("SerialNumber"))
+        if self._frequency_hz is None:
+            self._set_up()
+        else:  # the mirror would come to its pace again, whatever it was, each time that one is set
+            self._commands.append(m.read("LMPscancfg", optional=False))
         self._advance()
 
-    def _set_up(self) -> list[Command]:
+    def _set_up(self, config: m.ScanConfig | None = None) -> None:
+        """What is left to do to have scans, from the ``config`` that the device has now, where a pace is wanted."""
+        self._commands += [*self._changes(config), m.stream(True)]
+
+    def _changes(self, config: m.ScanConfig | None) -> list[Command]:
         changes: list[Command] = []
-        step = self._resolution_deg
-        if self._frequency_hz is not None and step is not None:
-            field = self._field_deg
-            changes.append(
-                m.scan_config(self._frequency_hz, step, *field) if field else m.read("LMPscancfg", optional=False)
-            )
+        pace_hz, step = self._frequency_hz, self._resolution_deg
+        if config is not None and pace_hz is not None and step is not None and not config.scans(pace_hz, step):
+            changes.append(m.scan_config(pace_hz, step, *(self._field_deg or config.field_deg)))
         if self._field_deg is not None and step is not None:
             changes.append(m.output_range(step, *self._field_deg))
         if self._intensities is not None:
@@ -147,7 +164,7 @@ class ColaSession(Outgoing):
         if not changes:
             return []
         if not self._passwords:
-            raise ValueError("what is to be changed needs a login")
+            raise DeviceFault("what is to be changed needs a login")
         login = m.login(self._passwords[0])
         return [login, *changes, m.method("LMCstartmeas", optional=True), m.method("Run")]
 
@@ -197,12 +214,13 @@ class ColaSession(Outgoing):
             self._commands.appendleft(m.login(self._passwords[self._login]))
         elif command.name == NAME and not self._commands and reader.integer("B") != 1:
             raise DeviceFault(f"{self._who()} does not start to send scans")
-        elif command.name == "LMPscancfg" and self._frequency_hz is not None and self._resolution_deg is not None:
-            field = m.field_of(reader)
-            self._commands.appendleft(m.scan_config(self._frequency_hz, self._resolution_deg, *field))
-        elif command.name == "mLMPsetscancfg" and (result := reader.integer("B")):
-            why = _SCAN_CONFIG_RESULTS[min(result, len(_SCAN_CONFIG_RESULTS) - 1)]
-            raise DeviceFault(f"{self._who()} refuses the scan: {why}")
+        elif command.name == "LMPscancfg":
+            self._set_up(m.ScanConfig.of(reader))
+        elif command.name == "mLMPsetscancfg":
+            if result := reader.integer("B"):
+                why = _SCAN_CONFIG_RESULTS[min(result, len(_SCAN_CONFIG_RESULTS) - 1)]
+                raise DeviceFault(f"{self._who()} refuses the scan: {why}")
+            self._new_pace = True
         elif command.name == "Run" and reader.integer("B") != 1:
             raise DeviceFault(f"{self._who()} does not run")
 
@@ -210,7 +228,7 @@ class ColaSession(Outgoing):
         self._tries += 1
         if not self._found and len(self._dialects) > 1:
             self._dialects.rotate(-1)
-        if self._tries <= _REPEATS + (not self._found) * 4:
+        if self._tries <= self._repeats:
             self._since = self._clock()
             self._output += command.ask(self.dialect).encode()
         elif command.optional and self._found:
@@ -243,7 +261,7 @@ class ColaSession(Outgoing):
         if distances is None:
             raise DeviceFault(f"{self._who()} sends no distances of a first echo")
         self._since, self._starts = self._clock(), 0
-        self._patience_s, self.ready = self._silence_s, True
+        self._new_pace, self.ready = False, True
         if data.layer != self._layer:
             return None
         count = len(distances.values)
@@ -260,6 +278,11 @@ class ColaSession(Outgoing):
         fits = strength is not None and len(strength.values) == count
         intensities = strength.intensities() if strength is not None and fits else None
         return Scan(beams, distances.ranges(), intensities, self._turns.seconds(data.since_start_us))
+
+    @property
+    def _repeats(self) -> int:
+        """How often the question under way is repeated."""
+        return _REPEATS if self._found else _FIRST_REPEATS
 
     def _who(self) -> str:
         return self.model or "the scanner"
