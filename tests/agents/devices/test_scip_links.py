@@ -13,10 +13,11 @@ import pytest
 from link_listening import QUICK, on_a_line, states, until
 from scip_conversation import room
 
+from tms_agents.devices.cola import ColaDevice, ColaSession
 from tms_agents.devices.emulation import PtyLine
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.scip import MODELS, ScipDevice, ScipLink, ScipSettings, scip_serial
-from tms_agents.devices.transport import DeviceState, Opener
+from tms_agents.devices.transport import DeviceState, Link, Opener
 
 TIMEOUT_S = 20.0
 
@@ -118,12 +119,24 @@ async def test_a_sensor_that_falls_silent_and_comes_back():
     assert "connected" in states(seen)[: states(seen).index("silent")]
 
 
-async def test_nobody_answers():
+@pytest.mark.parametrize("silent_after_s", [0.3, 1.0, 5.0])
+async def test_nobody_answers(silent_after_s):
     device = sensor("UST-20LX")
     device.silent = True
     async with on_a_line("tcp", device) as (_, opener):
-        (state,) = await until(link(opener), lambda seen: True, timeout_s=TIMEOUT_S)
+        (state,) = await until(link(opener, silent_after_s=silent_after_s), lambda seen: True, timeout_s=TIMEOUT_S)
     assert state == DeviceState("faulty", "floor: no answer to QT, in no version of SCIP")
+
+
+async def test_another_protocol_at_the_port_is_told_by_what_was_asked_in_vain():
+    sick = ColaDevice(lambda: (np.full(811, 2.0), None))
+    async with on_a_line("tcp", sick, tick_s=0.01) as (_, opener):
+        (state,) = await until(link(opener, silent_after_s=1.0), lambda seen: True, timeout_s=5.0)
+    assert state == DeviceState("faulty", "floor: no answer to QT, in no version of SCIP")
+    async with on_a_line("tcp", sensor("UST-20LX"), tick_s=0.005) as (_, opener):
+        other = Link(opener, ColaSession, name="floor", silent_after_s=1.0, retry=QUICK)
+        (state,) = await until(other, lambda seen: True, timeout_s=5.0)
+    assert state == DeviceState("faulty", "floor: the scanner does not answer sRN SCdevicestate, in CoLa A or B")
 
 
 async def test_a_refused_question_says_why():

@@ -17,8 +17,8 @@ from tms_agents.devices.scans import Scan
 from tms_agents.devices.sessions import DeviceFault
 
 _REPLY_S, _METHOD_S, _REPEATS = 1.0, 3.0, 1
-#: The first question, until there is an answer in one of the dialects.
-_FIRST_REPEATS = 5
+#: The first question, until there is an answer in one of the dialects: in each it is asked twice.
+_FIRST_REPEATS = 3
 #: So many starts, or damaged scans, in a row without a good scan between them are a fault.
 _MAX_STARTS, _MAX_DAMAGED = 3, 5
 _CLOCK_BITS = 32
@@ -235,7 +235,8 @@ class ColaSession(Outgoing):
             self._current = None
             self._advance()
         else:
-            raise DeviceFault(f"{self._who()} does not answer {command.verb} {command.name}")
+            tried = "" if self._found else f", in CoLa {' or '.join(sorted(self._dialects))}"
+            raise DeviceFault(f"{self._who()} does not answer {command.verb} {command.name}{tried}")
 
     def _advance(self) -> None:
         if self._current is None and self._commands:

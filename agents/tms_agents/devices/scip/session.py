@@ -22,6 +22,8 @@ from tms_agents.devices.sessions import DeviceFault
 #: So often scans may stop without one between, and so often a question is repeated.
 _MOST_RESTARTS, _MOST_TRIES = 3, 3
 _BETWEEN_RESTARTS_S = 0.5
+#: The session says what is missing before the link says that something is.
+_MARGIN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,11 @@ class ScipSession(Outgoing):
     def tick_s(self) -> float:
         """While the sensor measures by itself there is nothing to do but to see whether it still does."""
         return 0.2 if self._request is not None and not (self._old or self._settings.polled) else 0.02
+
+    @property
+    def quiet_s(self) -> float:
+        """Until the first answer: as long as it takes to ask for one in every version of SCIP."""
+        return 0.0 if self.frames else (2 * _MOST_TRIES + 1) * self._reply_s + _MARGIN_S
 
     @property
     def pending(self) -> int:
