@@ -41,6 +41,7 @@ class DeviceLink(ABC, Generic[T]):
     """Readings and states of one device, for as long as the caller listens; how it is asked is for subclasses.
 
     Nothing for ``silent_after_s`` seconds is "silent", for three times as long a fault; after a fault it connects anew.
+    A fault stays told until the device delivers, or there is another one: silence says less than it does.
     """
 
     def __init__(self, *, name: str, silent_after_s: float, retry: Retry | None) -> None:
@@ -77,7 +78,7 @@ class DeviceLink(ABC, Generic[T]):
         """What is to be said of a silence so long. Raises ``DeviceFault`` where it is too long."""
         if lasts_s > 3 * self._silent_after_s:
             raise DeviceFault(f"nothing for {3 * self._silent_after_s:g} s")
-        if lasts_s > self._silent_after_s:
+        if lasts_s > self._silent_after_s and (self._state is None or self._state.state != "faulty"):
             return self._change("silent", f"{self._name}: nothing for {self._silent_after_s:g} s")
         return []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -336,6 +337,31 @@ async def test_a_mirror_that_takes_its_time_to_another_pace_is_waited_for_and_no
     assert states(seen) == ["connected", "faulty", "connected"]
     assert all(scan.sweep.period_s == pytest.approx(0.04) for scan in seen if isinstance(scan, Scan))
     assert device.heard.count("sMN mLMPsetscancfg") == 1
+
+
+async def test_a_device_of_the_other_dialect_is_not_called_silent_while_it_is_found_out():
+    device = ColaDevice(Room(811), dialect="A")
+    async with on_a_line("tcp", device, tick_s=0.01) as (_, opener):
+        link = Link(opener, ColaSession, name="floor", silent_after_s=0.3, retry=QUICK)
+        seen = await until(link, lambda seen: isinstance(seen[-1], Scan), timeout_s=20)
+    assert states(seen) == ["connected"]
+
+
+@pytest.mark.parametrize("dialect", ["A", "B"])
+async def test_a_refused_login_stays_the_reason_over_new_connections(dialect):
+    device = ColaDevice(Room(811), model=replace(MODELS["TiM571"], password=1), dialect=dialect)
+    async with on_a_line("tcp", device, tick_s=0.01) as (_, opener):
+
+        async def mend_at_the_third_connection():
+            while device.heard.count("sMN SetAccessMode") < 3 * len(m.PASSWORDS):
+                await asyncio.sleep(0.02)
+            device.model = MODELS["TiM571"]
+
+        link = Link(opener, ColaSession, name="floor", silent_after_s=0.5, retry=QUICK)
+        mending = asyncio.create_task(mend_at_the_third_connection())
+        seen = await until(link, lambda seen: isinstance(seen[-1], Scan), timeout_s=20)
+        await mending
+    assert states(seen) == ["faulty", "connected"]
 
 
 async def test_pollution_is_told_with_the_state_while_it_goes_on():

@@ -89,6 +89,25 @@ async def test_llrp_second_client_and_refused_commands_say_why():
         assert state.why == "reader: ADD_ROSPEC_RESPONSE: status 101 ADD_ROSPEC fails"
 
 
+async def test_a_fault_stays_told_until_something_is_better():
+    """Not "silent" at every new connection to a reader that refuses, or says nothing, after a while."""
+    device = Tr3Device()
+    device.see(UID)
+
+    def change(item):
+        if isinstance(item, TagRead):
+            device.nack_next = 5  # a fault
+        elif isinstance(item, DeviceState) and item.state == "faulty":
+            device.silent = "format error" in item.why
+            heard.append(item.why)
+
+    heard: list[str] = []
+    async with on_a_line("tcp", device) as (_, opener):
+        seen = await until(tr3(opener, silent_after_s=0.2), lambda seen: len(heard) == 2 and is_read(seen), change)
+    assert states(seen) == ["connected", "faulty", "faulty", "connected"]
+    assert heard[0].endswith("format error") and heard[1] == "tr3: nothing for 0.6 s"
+
+
 async def test_nobody_listens():
     (state,) = await until(llrp(9), lambda seen: True)
     assert state.state == "faulty" and "Connect call failed" in state.why
