@@ -12,6 +12,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from tms_agents.clocks import Clocks
+from tms_agents.commands.floor_files import warn
 from tms_agents.config import read_config
 from tms_agents.devices.scans import Scan
 from tms_agents.devices.transport import DeviceState
@@ -68,6 +69,8 @@ def record(arguments: argparse.Namespace) -> int:
         writer = ScanWriter(arguments.out)
     except (OSError, ValueError) as error:
         raise CommandError(f"{arguments.out}: {getattr(error, 'strerror', None) or error}") from error
+    if words := writer.damage.in_words():
+        warn(f"{arguments.out}: {words}")
     with contextlib.closing(writer), contextlib.suppress(asyncio.CancelledError):
         asyncio.run(until_signalled(_record(config, arguments, writer)))
     _say(f"{arguments.out}: {writer.written} scans")
@@ -99,7 +102,7 @@ async def _record(config: FloorConfig, arguments: argparse.Namespace, writer: Sc
 
 def _scans(arguments: argparse.Namespace, config: FloorConfig, names: list[str], usual_s: float) -> list[Recorded]:
     if arguments.scans:
-        return from_files(arguments.scans, config, names)
+        return from_files(arguments.scans, config, names, warn)
     seconds = usual_s if arguments.seconds is None else arguments.seconds
     if not 0.5 <= seconds <= 3600:
         raise CommandError("--seconds is 0.5 to 3600")

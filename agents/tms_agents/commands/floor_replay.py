@@ -7,9 +7,9 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace as changed
-from pathlib import Path
 from typing import Any
 
+from tms_agents.commands.floor_files import warn, write_file
 from tms_agents.config import read_config
 from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
@@ -47,7 +47,7 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
         like, poses = calibrated(read_config(arguments.config, FloorConfig), arguments.config)
     scales = {} if like is None else {one.name: one.range_scale for one in like.lasers}
     recordings: list[Recorded] = []
-    for one in [one for path in arguments.scans for one in read_scans(path)]:
+    for one in [one for path in arguments.scans for one in read_scans(path, warn)]:
         name, count = one.name, 2
         while name in [other.name for other in recordings]:
             name, count = f"{one.name} {count}", count + 1
@@ -61,14 +61,6 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
         recordings = [changed(one, pose=pose) for one, pose in zip(recordings, given, strict=True)]
     config = config_of(recordings, like)
     return config, recordings
-
-
-def write_file(path: Path, data: bytes) -> None:
-    """Raises CommandError where that cannot be."""
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise CommandError(f"{path}: {error.strerror}") from error
 
 
 def _pose(text: str) -> Pose:

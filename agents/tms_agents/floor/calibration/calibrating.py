@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.calibration.walkers import Registration, register, walker_tracks
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.lasers import Laser
-from tms_agents.floor.recordings.formats import read_scans
+from tms_agents.floor.recordings.formats import Say, read_scans
 from tms_agents.floor.recordings.recorded import Recorded, forward
 from tms_agents.floor.runner import listen
 from tms_agents.floor.scan.walls import MATCHED_M, Fit, fit_walls
@@ -25,7 +25,6 @@ from tms_agents.floor.settings import FloorSettings, Pose
 from tms_client import Town, TownError
 from tms_client.cli import CommandError
 
-Say = Callable[[str], object]
 _MOST_SCANS = 20_000
 _WAIT_S = 20.0
 #: More than this is no fit that an installer wants.
@@ -70,13 +69,15 @@ async def gather(config: FloorConfig, names: Sequence[str], seconds: float) -> l
     return [_recorded(name, lasers[name].pose, found[name]) for name in names]
 
 
-def from_files(paths: Sequence[Path], config: FloorConfig, names: Sequence[str]) -> list[Recorded]:
+def from_files(paths: Sequence[Path], config: FloorConfig, names: Sequence[str], say: Say) -> list[Recorded]:
     """The same out of recordings: by the lasers' names, or in their order where there is a file for each.
+
+    ``say`` is told what of them is left out.
 
     Raises:
         CommandError: a file cannot be read, or it is not clear which laser made it.
     """
-    recordings = [one for path in paths for one in read_scans(path)]
+    recordings = [one for path in paths for one in read_scans(path, say)]
     by_name = {one.name: one for one in recordings}
     if set(names) <= set(by_name):
         chosen = [by_name[name] for name in names]

@@ -52,6 +52,8 @@ class Recorder:
                 self._path.replace(self._path.with_name(self._path.name + ".old"))
             if self._writer is None:
                 self._writer = ScanWriter(self._path)
+                if words := self._writer.damage.in_words():
+                    log.warning("recording %s: %s", self._path, words)
             self._writer.add(laser, pose, t, scan)
         except (OSError, ValueError) as error:
             log.warning("recording %s: %s; nothing is recorded for a minute", self._path, error)

@@ -1,33 +1,25 @@
 """Our recording of scans: a file that is only ever appended to, whole up to its last second whatever happens.
 
-``TMSSCAN1\\n``, then records: kind (1 byte), length and CRC-32 of the body (4 bytes each, little-endian), body. Kind S
-describes a sensor (JSON) and gives it a number, kind B is a block of its scans: ranges in the sensor's unit as 16 bit
-numbers, each scan as the difference to the one before, compressed. A torn record at the end is ignored by readers and
-cut off by the next writer; readers may read while a writer writes.
+Its records are described in ``records``, the blocks of scans in ``blocks``. A torn record at the end is left out by
+readers and cut off by the next writer; what is damaged before it stays and is skipped. Readers may read while a writer
+writes.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import struct
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tms_agents.devices.scans import Array, Scan, Sweep
+from tms_agents.floor.recordings.blocks import MOST_UNITS, packed, unpacked
 from tms_agents.floor.recordings.recorded import Pose, Recorded
+from tms_agents.floor.recordings.records import BLOCK, HEAD, MAGIC, Damage, records
 
-MAGIC = b"TMSSCAN1\n"
-_HEAD = struct.Struct("<cII")
-_BLOCK = struct.Struct("<HHIB")  # sensor, scans, beams, what is in it
-_HAS_INTENSITIES, _HAS_DEVICE_TIME = 1, 2
-_NO_ECHO, _ERROR = 0xFFFF, 0xFFFE
-_MOST = 1 << 26
 #: Of what is written between two times that the disk was told to be sure, so much may be torn by a power cut.
 _TORN = 1 << 22
 #: A block is written after so many seconds of scans or so many scans.
@@ -42,13 +34,15 @@ class ScanWriter:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        #: What of the file that was there cannot be read.
+        self.damage = Damage()
         self._file: IO[bytes] = path.open("ab+")
         try:
-            end = _whole(self._file)
-            self._file.truncate(end)
-            if end == 0:
+            self._next = _next_number(self._file, self.damage)
+            if self.damage.tail <= _TORN:  # nothing that can be read comes after it
+                self._file.truncate(self.damage.whole)
+            if self.size == 0:
                 self._file.write(MAGIC)
-            self._next = _sensors(self._file) if end else 0
         except BaseException:
             self._file.close()
             raise
@@ -92,7 +86,7 @@ class ScanWriter:
     def _describe(self, sensor: str, pose: Pose, sweep: Sweep) -> None:
         # Whole millimetres, as devices have them, unless the reach needs more room.
         reach = sweep.range_max_m if np.isfinite(sweep.range_max_m) else 65.0
-        unit = 0.001 * max(1, int(np.ceil(reach * 1000 / (_ERROR - 1))))
+        unit = 0.001 * max(1, int(np.ceil(reach * 1000 / MOST_UNITS)))
         number, self._next = self._next, self._next + 1
         self._numbers[sensor] = (sweep, pose, number, unit)
         told = {
@@ -113,31 +107,35 @@ class ScanWriter:
         if scans := self._waiting.get(sensor):
             _, _, number, unit = self._numbers[sensor]
             self._waiting[sensor] = []
-            self._record(b"B", _packed(number, unit, scans))
+            self._record(b"B", packed(number, unit, scans))
 
     def _record(self, kind: bytes, body: bytes) -> None:
-        self._file.write(_HEAD.pack(kind, len(body), zlib.crc32(body)) + body)
+        self._file.write(HEAD.pack(kind, len(body), zlib.crc32(body)) + body)
 
 
-def read_recording(path: Path) -> list[Recorded]:
+def read_recording(path: Path, damage: Damage) -> list[Recorded]:
     """All whole records, of a sensor as long as it sweeps and stands the same, also if it is described again.
 
     Raises:
-        ValueError: it is no recording, or a record in the middle is damaged.
+        ValueError: it is no recording.
         OSError: the file cannot be read.
     """
     units: dict[int, float] = {}
     described: dict[int, str] = {}
+    beams: dict[int, int] = {}
     blocks: dict[str, list[tuple[Array, Array, Array | None]]] = {}
     with path.open("rb") as file:
-        for kind, body in _records(file):
-            if kind == b"S":
-                told = json.loads(zlib.decompress(body))
+        for record in records(file, damage):
+            if record.kind == b"S":
+                told = json.loads(zlib.decompress(record.body))
                 number = told.pop("sensor")
-                units[number], described[number] = told["unit_m"], json.dumps(told)
-            elif kind == b"B":
-                number = _BLOCK.unpack_from(body)[0]
-                blocks.setdefault(described[number], []).append(_unpacked(body, units[number]))
+                units[number], described[number], beams[number] = told["unit_m"], json.dumps(told), len(told["angles"])
+                continue
+            number, scans, wide, _ = BLOCK.unpack_from(record.body)
+            if beams.get(number) == wide:
+                blocks.setdefault(described[number], []).append(unpacked(record.body, units[number]))
+            else:
+                damage.undescribed += scans
     return [_joined(json.loads(told), found) for told, found in blocks.items()]
 
 
@@ -166,88 +164,14 @@ def _sweep(told: dict[str, Any]) -> Sweep:
     )
 
 
-def _packed(number: int, unit: float, scans: list[tuple[float, Scan]]) -> bytes:
-    ranges = np.array([scan.ranges for _, scan in scans])
-    with np.errstate(invalid="ignore"):
-        whole = np.clip(np.rint(np.nan_to_num(ranges, nan=0.0, posinf=0.0) / unit), 0, _ERROR - 1).astype(np.uint16)
-    whole[np.isinf(ranges)] = _NO_ECHO
-    whole[np.isnan(ranges)] = _ERROR
-    parts = [np.array([t for t, _ in scans]).tobytes(), _shuffled(whole)]
-    what = 0
-    if all(scan.intensities is not None for _, scan in scans):
-        what |= _HAS_INTENSITIES
-        bright = np.array([scan.intensities for _, scan in scans], dtype=np.float64)
-        parts.append(_shuffled(np.clip(np.rint(np.nan_to_num(bright)), 0, 0xFFFF).astype(np.uint16)))
-    if all(scan.device_time_s is not None for _, scan in scans):
-        what |= _HAS_DEVICE_TIME
-        parts.append(np.array([scan.device_time_s for _, scan in scans], dtype=np.float64).tobytes())
-    return _BLOCK.pack(number, *whole.shape, what) + zlib.compress(b"".join(parts), 6)
-
-
-def _unpacked(body: bytes, unit: float) -> tuple[Array, Array, Array | None]:
-    _, scans, beams, what = _BLOCK.unpack_from(body)
-    data = zlib.decompress(body[_BLOCK.size :])
-    t = np.frombuffer(data, np.float64, scans).copy()
-    size = 2 * scans * beams
-    whole = _unshuffled(data[8 * scans : 8 * scans + size], scans, beams)
-    ranges = np.round(whole * unit, 6)
-    ranges[whole == _NO_ECHO] = np.inf
-    ranges[whole == _ERROR] = np.nan
-    bright = None
-    if what & _HAS_INTENSITIES:
-        bright = _unshuffled(data[8 * scans + size : 8 * scans + 2 * size], scans, beams).astype(np.float64)
-    return t, ranges, bright
-
-
-def _shuffled(values: NDArray[np.uint16]) -> bytes:
-    """Differences from scan to scan, low bytes before high ones: what compresses well."""
-    steps = np.diff(values, axis=0, prepend=np.uint16(0))
-    # Small steps of either sign get small numbers: 0, -1, 1, -2 ... as 0, 1, 2, 3.
-    signed = steps.view(np.int16)
-    folded = ((signed << 1) ^ (signed >> 15)).view(np.uint16)
-    return (folded & 0xFF).astype(np.uint8).tobytes() + (folded >> 8).astype(np.uint8).tobytes()
-
-
-def _unshuffled(data: bytes, scans: int, beams: int) -> NDArray[np.uint16]:
-    low, high = np.frombuffer(data, np.uint8).reshape(2, scans, beams).astype(np.uint16)
-    folded = low | (high << np.uint16(8))
-    steps = (folded >> np.uint16(1)) ^ (np.uint16(0) - (folded & np.uint16(1)))
-    values: NDArray[np.uint16] = np.cumsum(steps, axis=0, dtype=np.uint16)
-    return values
-
-
-def _records(file: IO[bytes]) -> Iterator[tuple[bytes, bytes]]:
-    """Whole records from the start; a torn one at the end is no error."""
-    if (start := file.read(len(MAGIC))) != MAGIC:
-        if MAGIC.startswith(start):
-            return
-        raise ValueError("it is no recording of scans")
-    while len(head := file.read(_HEAD.size)) == _HEAD.size:
-        kind, length, check = _HEAD.unpack(head)
-        body = file.read(min(length, _MOST))
-        if kind not in (b"S", b"B") or len(body) < length or zlib.crc32(body) != check:
-            at = file.tell() - len(body) - len(head)
-            if file.seek(0, os.SEEK_END) - at > _TORN:
-                raise ValueError(f"it is damaged after {at} bytes")
-            return
-        yield kind, body
-
-
-def _whole(file: IO[bytes]) -> int:
-    """Where the last whole record ends."""
-    file.seek(0)
-    end = 0
-    for _ in _records(file):
-        end = file.tell()
-    if end == 0:
-        file.seek(0)
-        end = len(MAGIC) if file.read(len(MAGIC)) == MAGIC else 0
-    return end
-
-
-def _sensors(file: IO[bytes]) -> int:
-    """How many sensors are described so far."""
-    file.seek(0)
-    count = sum(kind == b"S" for kind, _ in _records(file))
-    file.seek(0, os.SEEK_END)
-    return count
+def _next_number(file: IO[bytes], damage: Damage) -> int:
+    """A number that no sensor has had in this file, nor one whose description is damaged."""
+    most = -1
+    for record in records(file, damage):
+        number = (
+            BLOCK.unpack_from(record.body)[0]
+            if record.kind == b"B"
+            else json.loads(zlib.decompress(record.body))["sensor"]
+        )
+        most = max(most, number)
+    return most + 1
