@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
+from tms_agents.files import written_whole
 from tms_client.cli import CommandError
 
 
@@ -13,9 +17,22 @@ def warn(text: str) -> None:
     sys.stderr.write(f"tms: {text}\n")
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Raises CommandError where that cannot be."""
+@contextlib.contextmanager
+def result(path: Path) -> Iterator[IO[bytes]]:
+    """A file for what a command finds out bit by bit; an older one stays where the work does not come to its end.
+
+    Raises:
+        CommandError: it cannot be written.
+    """
     try:
-        path.write_bytes(data)
+        # What is no file (/dev/stdout, a pipe) is written to; anything else would replace it.
+        with path.open("wb") if path.exists() and not path.is_file() else written_whole(path.resolve()) as file:
+            yield file
     except OSError as error:
         raise CommandError(f"{path}: {error.strerror}") from error
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Raises CommandError where that cannot be."""
+    with result(path) as file:
+        file.write(data)

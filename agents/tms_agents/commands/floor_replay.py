@@ -9,13 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace as changed
 from typing import Any
 
-from tms_agents.commands.floor_files import warn, write_file
+from tms_agents.commands.floor_files import result, warn, write_file
 from tms_agents.config import read_config
 from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.recordings.formats import read_scans
 from tms_agents.floor.recordings.recorded import Recorded
-from tms_agents.floor.recordings.replay import Replay, tracks
+from tms_agents.floor.recordings.replay import Replay, Tracks
 from tms_agents.floor.settings import Pose
 from tms_agents.floor.watch.picture import tracks_png
 from tms_agents.floor.watch.watching import config_of, play
@@ -24,14 +24,20 @@ from tms_client.cli import CommandError
 
 def replay(arguments: argparse.Namespace) -> int:
     config, recordings = recordings_of(arguments)
+    tracks = Tracks()
     try:
         run = Replay(recordings, config.settings(), config.room_scene())
-        frames = run.frames(_progress(run.scans))
+        with result(arguments.out) as file:
+            file.write(b"[")
+            for n, frame in enumerate(run.frames(_progress(run.scans))):
+                file.write((", " * bool(n) + json.dumps(frame, allow_nan=False)).encode())
+                if arguments.png is not None:
+                    tracks.add(frame)
+            file.write(b"]\n")
     except ValueError as error:
         raise CommandError(f"{', '.join(map(str, arguments.scans))}: {error}") from error
-    write_file(arguments.out, (json.dumps(frames, allow_nan=False) + "\n").encode())
     if arguments.png is not None:
-        write_file(arguments.png, tracks_png(_walls(recordings, config), tracks(frames)))
+        write_file(arguments.png, tracks_png(_walls(recordings, config), tracks.all()))
     return 0
 
 

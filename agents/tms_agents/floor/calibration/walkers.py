@@ -45,7 +45,7 @@ def walker_tracks(recorded: Recorded, pose: Pose, settings: FloorSettings | None
     found: dict[int, list[tuple[float, float, float]]] = {}
     for n in range(len(recorded)):
         t = float(recorded.t[n])
-        estimator.scan(recorded.name, t, recorded.ranges[n])
+        estimator.scan(recorded.name, t, recorded.scan(n).ranges)
         for one in estimator.labels():
             if one.kind == "mover" and not one.stale and t - one.seen_at < 0.05:
                 found.setdefault(one.id, []).append((t, *one.xy))

@@ -38,11 +38,16 @@ def packed(number: int, unit: float, scans: Sequence[tuple[float, Scan]]) -> byt
     return BLOCK.pack(number, *whole.shape, what) + zlib.compress(b"".join(parts), 6)
 
 
-def unpacked(body: bytes, unit: float) -> tuple[Array, Array, Array | None]:
-    """Times (T,), ranges (T, B), intensities (T, B)."""
+def times(body: bytes) -> Array:
+    """(T,) s; the rest stays packed."""
+    _, scans, _, _ = BLOCK.unpack_from(body)
+    return np.frombuffer(zlib.decompressobj().decompress(body[BLOCK.size :], 8 * scans), np.float64, scans)
+
+
+def unpacked(body: bytes, unit: float) -> tuple[Array, Array | None]:
+    """Ranges (T, B), intensities (T, B)."""
     _, scans, beams, what = BLOCK.unpack_from(body)
     data = zlib.decompress(body[BLOCK.size :])
-    t = np.frombuffer(data, np.float64, scans).copy()
     size = 2 * scans * beams
     whole = _unshuffled(data[8 * scans : 8 * scans + size], scans, beams)
     ranges = np.round(whole * unit, 6)
@@ -51,7 +56,7 @@ def unpacked(body: bytes, unit: float) -> tuple[Array, Array, Array | None]:
     bright = None
     if what & _HAS_INTENSITIES:
         bright = _unshuffled(data[8 * scans + size : 8 * scans + 2 * size], scans, beams).astype(np.float64)
-    return t, ranges, bright
+    return ranges, bright
 
 
 def _shuffled(values: NDArray[np.uint16]) -> bytes:

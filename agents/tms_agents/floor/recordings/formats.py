@@ -10,8 +10,8 @@ from tms_agents.bags import is_bag
 from tms_agents.floor.recordings.formats_csv import read_csv
 from tms_agents.floor.recordings.formats_npz import read_npz
 from tms_agents.floor.recordings.formats_rosbag import read_rosbag
+from tms_agents.floor.recordings.reading import read_recording
 from tms_agents.floor.recordings.recorded import Recorded, forward
-from tms_agents.floor.recordings.recording import read_recording
 from tms_agents.floor.recordings.records import Damage
 from tms_client.cli import CommandError
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from tms_agents.devices.scans import Sweep
-from tms_agents.floor.recordings.recorded import Recorded, clean_ranges
+from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, rows_of
 
 _NUMBERS = ("angle_min", "angle_increment", "range_min", "range_max", "time_increment", "period")
 _WORDS = ("pose", "unit", "model")
@@ -65,13 +65,13 @@ def _row(text: str, number: int, expected: int) -> list[float]:
     return row
 
 
-def _recorded(name: str, told: dict[str, str], rows: list[list[float]]) -> Recorded:
+def _recorded(name: str, told: dict[str, str], lines: list[list[float]]) -> Recorded:
     for needed in ("angle_min", "angle_increment"):
         if needed not in told:
             raise ValueError(f"a line '# {needed} = ...' is missing")
     if told.get("unit", "m") not in ("m", "mm"):
         raise ValueError(f"unit = {told['unit']!r}: it is m or mm")
-    values = np.array(rows) if rows else np.empty((0, 2))
+    values = np.array(lines) if lines else np.empty((0, 2))
     t, ranges = values[:, 0], values[:, 1:] * (0.001 if told.get("unit") == "mm" else 1.0)
     range_min, range_max = float(told.get("range_min", 0.0)), float(told.get("range_max", "inf"))
     period = float(told.get("period", 0.0)) or (float(np.median(np.diff(t))) if len(t) > 1 else 0.1)
@@ -83,7 +83,8 @@ def _recorded(name: str, told: dict[str, str], rows: list[list[float]]) -> Recor
         range_max_m=range_max,
         model=told.get("model", ""),
     )
-    return Recorded(name, sweep, _pose(told.get("pose", "0 0 0")), t, clean_ranges(ranges, range_min, range_max))
+    rows = rows_of(clean_ranges(ranges, range_min, range_max))
+    return Recorded(name, sweep, _pose(told.get("pose", "0 0 0")), t, rows)
 
 
 def _pose(text: str) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tms_agents.devices.scans import Array, Sweep
-from tms_agents.floor.recordings.recorded import Recorded, clean_ranges
+from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, rows_of
 
 _MOST_BEAMS = 100_000
 
@@ -52,7 +52,8 @@ def read_npz(path: Path) -> Recorded:
     # Some drivers announce intensities and send none.
     bright = "intensities" in values and np.shape(values["intensities"]) == ranges.shape
     intensities = _array(values, "intensities", 2) if bright else None
-    return Recorded(path.stem, sweep, _pose(values), t, clean_ranges(ranges, range_min, range_max), intensities)
+    rows = rows_of(clean_ranges(ranges, range_min, range_max), intensities)
+    return Recorded(path.stem, sweep, _pose(values), t, rows)
 
 
 def _array(values: dict[str, Any], name: str, dimensions: int) -> Array:

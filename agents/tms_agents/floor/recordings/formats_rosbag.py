@@ -11,7 +11,7 @@ import numpy as np
 
 from tms_agents.bags import read_messages
 from tms_agents.devices.scans import Sweep
-from tms_agents.floor.recordings.recorded import Recorded, clean_ranges
+from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, rows_of
 
 
 def read_rosbag(path: Path) -> list[Recorded]:
@@ -41,8 +41,8 @@ def _recordings(topics: dict[str, list[Any]]) -> Iterator[Recorded]:
             range_max_m=float(first.range_max),
             model=str(first.header.frame_id),
         )
-        whole = all(len(one.intensities) == shape for one in scans)
-        intensities = np.array([one.intensities for one in scans], dtype=np.float64) if whole else None
         name = re.sub(r"[^A-Za-z0-9._-]+", "_", topic.strip("/")) or "scan"
         cleaned = clean_ranges(ranges, sweep.range_min_m, sweep.range_max_m)
-        yield Recorded(name, sweep, (0.0, 0.0, 0.0), t, cleaned, intensities if shape else None)
+        whole = all(len(one.intensities) == shape for one in scans)
+        intensities = np.array([one.intensities for one in scans], dtype=np.float64) if whole else None
+        yield Recorded(name, sweep, (0.0, 0.0, 0.0), t, rows_of(cleaned, intensities if shape else None))

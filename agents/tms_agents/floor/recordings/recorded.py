@@ -5,12 +5,16 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tms_agents.devices.scans import Array, Scan, Sweep
 
 Pose = tuple[float, float, float]
+#: Of one scan: ranges (B,) m as in ``Scan``, intensities (B,) where it has them.
+Row = tuple[Array, Array | None]
 
 #: A range so close to the end of the reach stands for "nothing within reach" in recordings of many drivers.
 _FILL_M = 5e-4
@@ -18,9 +22,17 @@ _FILL_M = 5e-4
 _FAR_M = 0.0
 
 
+class Rows(Protocol):
+    """Scans by their numbers; of a large file they are read when they are wanted."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, n: int, /) -> Row: ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Recorded:
-    """Scans of one sensor: ``t`` (T,) s of the first beams, rising, ``ranges`` (T, B) m as in ``Scan``.
+    """Scans of one sensor: ``t`` (T,) s of the first beams, and what was measured.
 
     ``pose`` is that of the sensor in the room: x, y in metres, yaw in radians; ``range_scale``: what it measures times
     this is how far it is, if that is known.
@@ -30,8 +42,7 @@ class Recorded:
     sweep: Sweep
     pose: Pose
     t: Array
-    ranges: Array
-    intensities: Array | None = None
+    rows: Rows
     range_scale: float | None = None
 
     def __len__(self) -> int:
@@ -39,14 +50,28 @@ class Recorded:
 
     def scan(self, n: int) -> Scan:
         """One of them, as a driver delivers it."""
-        return Scan(self.sweep, self.ranges[n], None if self.intensities is None else self.intensities[n])
+        return Scan(self.sweep, *self.rows[n])
+
+    @property
+    def ranges(self) -> Array:
+        """Of all scans (T, B): to be asked of recordings that are not large."""
+        return np.array([self.rows[n][0] for n in range(len(self))])
+
+
+def rows_of(ranges: Array, intensities: Array | None = None) -> Rows:
+    """Of arrays (T, B)."""
+    return [(one, None if intensities is None else intensities[n]) for n, one in enumerate(ranges)]
 
 
 def in_time(recordings: Sequence[Recorded]) -> Iterator[tuple[int, int]]:
     """(recording, scan) of all in the order of their times."""
-    streams = ([(float(t), number, n) for n, t in enumerate(one.t)] for number, one in enumerate(recordings))
-    for _, number, n in heapq.merge(*streams):
+    for _, number, n in heapq.merge(*(_timed(number, one.t) for number, one in enumerate(recordings))):
         yield number, n
+
+
+def _timed(number: int, t: Array) -> Iterator[tuple[float, int, int]]:
+    for n in range(len(t)):
+        yield float(t[n]), number, n
 
 
 def clean_ranges(ranges: Array, range_min_m: float, range_max_m: float) -> Array:
@@ -70,7 +95,26 @@ def clean_ranges(ranges: Array, range_min_m: float, range_max_m: float) -> Array
 def forward(one: Recorded) -> Recorded:
     """Without the scans whose time is not after all those before: no estimator can use them."""
     rising = one.t > np.concatenate([[-np.inf], np.maximum.accumulate(one.t)[:-1]])
-    if rising.all():
-        return one
-    kept = None if one.intensities is None else one.intensities[rising]
-    return replace(one, t=one.t[rising], ranges=one.ranges[rising], intensities=kept)
+    return one if rising.all() else _chosen(one, np.flatnonzero(rising))
+
+
+def thinned(one: Recorded, most: int) -> Recorded:
+    """At most so many of the scans, evenly spread: for what does not need all of them."""
+    return one if len(one) <= most else _chosen(one, np.linspace(0, len(one) - 1, most).round().astype(np.intp))
+
+
+def _chosen(one: Recorded, numbers: NDArray[np.intp]) -> Recorded:
+    return replace(one, t=one.t[numbers], rows=_Chosen(one.rows, numbers))
+
+
+class _Chosen:
+    """Some rows of others."""
+
+    def __init__(self, rows: Rows, numbers: NDArray[np.intp]) -> None:
+        self._rows, self._numbers = rows, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, n: int, /) -> Row:
+        return self._rows[int(self._numbers[n])]

@@ -11,13 +11,13 @@ import json
 import os
 import zlib
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 
-from tms_agents.devices.scans import Array, Scan, Sweep
-from tms_agents.floor.recordings.blocks import MOST_UNITS, packed, unpacked
-from tms_agents.floor.recordings.recorded import Pose, Recorded
+from tms_agents.devices.scans import Scan, Sweep
+from tms_agents.floor.recordings.blocks import MOST_UNITS, packed
+from tms_agents.floor.recordings.recorded import Pose
 from tms_agents.floor.recordings.records import BLOCK, HEAD, MAGIC, Damage, records
 
 #: Of what is written between two times that the disk was told to be sure, so much may be torn by a power cut.
@@ -111,57 +111,6 @@ class ScanWriter:
 
     def _record(self, kind: bytes, body: bytes) -> None:
         self._file.write(HEAD.pack(kind, len(body), zlib.crc32(body)) + body)
-
-
-def read_recording(path: Path, damage: Damage) -> list[Recorded]:
-    """All whole records, of a sensor as long as it sweeps and stands the same, also if it is described again.
-
-    Raises:
-        ValueError: it is no recording.
-        OSError: the file cannot be read.
-    """
-    units: dict[int, float] = {}
-    described: dict[int, str] = {}
-    beams: dict[int, int] = {}
-    blocks: dict[str, list[tuple[Array, Array, Array | None]]] = {}
-    with path.open("rb") as file:
-        for record in records(file, damage):
-            if record.kind == b"S":
-                told = json.loads(zlib.decompress(record.body))
-                number = told.pop("sensor")
-                units[number], described[number], beams[number] = told["unit_m"], json.dumps(told), len(told["angles"])
-                continue
-            number, scans, wide, _ = BLOCK.unpack_from(record.body)
-            if beams.get(number) == wide:
-                blocks.setdefault(described[number], []).append(unpacked(record.body, units[number]))
-            else:
-                damage.undescribed += scans
-    return [_joined(json.loads(told), found) for told, found in blocks.items()]
-
-
-def _joined(told: dict[str, Any], blocks: list[tuple[Array, Array, Array | None]]) -> Recorded:
-    x, y, theta = told["pose"]
-    bright = [one[2] for one in blocks if one[2] is not None]
-    return Recorded(
-        told["name"],
-        _sweep(told),
-        (x, y, theta),
-        np.concatenate([one[0] for one in blocks]),
-        np.concatenate([one[1] for one in blocks]),
-        np.concatenate(bright) if len(bright) == len(blocks) else None,
-    )
-
-
-def _sweep(told: dict[str, Any]) -> Sweep:
-    far = told["range_max_m"]
-    return Sweep(
-        np.array(told["angles"], dtype=np.float64),
-        told["time_increment_s"],
-        told["period_s"],
-        told["range_min_m"],
-        np.inf if far is None else far,
-        told["model"],
-    )
 
 
 def _next_number(file: IO[bytes], damage: Damage) -> int:

@@ -27,7 +27,8 @@ _LIKELY = re.compile(
     rb"S.{3}\x00.{4}x[\x01\x5e\x9c\xda]|B.{3}[\x00-\x03].{4}.{8}[\x00-\x03]x[\x01\x5e\x9c\xda]", re.DOTALL
 )
 _LIKELY_BYTES = HEAD.size + BLOCK.size + 2
-_WINDOW = 1 << 18
+#: So much is looked through at once, at first: where much looks like a record the next one is near.
+_WINDOW, _WIDEST = 1 << 12, 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +115,14 @@ def _most_of_block(begin: bytes) -> int:
 
 def _next_likely(file: IO[bytes], at: int, size: int) -> int:
     """Where, from there on, a record may begin; the size of the file where none does."""
+    wide = _WINDOW
     while at < size:
         file.seek(at)
-        window = file.read(_WINDOW)
+        window = file.read(wide)
         if found := _LIKELY.search(window):
             return at + found.start()
-        if len(window) < _WINDOW:
+        if len(window) < wide:
             break
         at += len(window) - _LIKELY_BYTES + 1
+        wide = min(2 * wide, _WIDEST)
     return size

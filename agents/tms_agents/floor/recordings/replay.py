@@ -30,27 +30,30 @@ class Replay:
             scan = one.scan(n)
             yield self._names[number], t, n, self.estimator.scan(self._names[number], t, scan.ranges, scan.intensities)
 
-    def frames(self, progress: Callable[[int], None] = lambda done: None) -> list[dict[str, Any]]:
+    def frames(self, progress: Callable[[int], None] = lambda done: None) -> Iterator[dict[str, Any]]:
         """The result of ``tms floor replay``: an entry per scan."""
-        found = []
         for done, (_, t, _, _) in enumerate(self.play(), 1):
             labels = [
                 {"id": one.id, "attr": one.kind, "x": round(one.xy[0], 4), "y": round(one.xy[1], 4)}
                 for one in self.estimator.labels()
             ]
-            found.append({"t": t, "labels": labels})
+            yield {"t": t, "labels": labels}
             progress(done)
-        return found
 
 
-def tracks(frames: Sequence[dict[str, Any]]) -> list[tuple[int, str, list[list[float]]]]:
-    """(number, mover or object, places) of every label in them, the oldest first."""
-    found: dict[int, tuple[int, str, list[list[float]]]] = {}
-    for frame in frames:
+class Tracks:
+    """(number, mover or object, places) of every label in frames, the oldest first."""
+
+    def __init__(self) -> None:
+        self._found: dict[int, tuple[int, str, list[tuple[float, float]]]] = {}
+
+    def add(self, frame: dict[str, Any]) -> None:
         for label in frame["labels"]:
-            track = found.setdefault(label["id"], (label["id"], label["attr"], []))
-            track[2].append([label["x"], label["y"]])
-    return list(found.values())
+            track = self._found.setdefault(label["id"], (label["id"], label["attr"], []))
+            track[2].append((label["x"], label["y"]))
+
+    def all(self) -> list[tuple[int, str, list[tuple[float, float]]]]:
+        return list(self._found.values())
 
 
 def _names(recordings: Sequence[Recorded]) -> list[str]:

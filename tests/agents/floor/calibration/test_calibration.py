@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tms_agents.floor.calibration.calibrating import static_points
 from tms_agents.floor.calibration.walkers import register, walker_tracks
-from tms_agents.floor.recordings.recorded import Recorded
+from tms_agents.floor.recordings.recorded import Recorded, rows_of
 from tms_agents.floor.scan.walls import fit_walls
 
 SWEEP = sweep()
@@ -96,7 +96,7 @@ def walk(seconds=26.0, people=1, offset=0.0):
         seen[name][0].append(100 + t - (offset if name == "b" else 0.0))
         seen[name][1].append(room.ranges(SWEEP, pose))
     return [
-        Recorded(name, SWEEP, pose, np.array(seen[name][0]), np.array(seen[name][1]))
+        Recorded(name, SWEEP, pose, np.array(seen[name][0]), rows_of(np.array(seen[name][1])))
         for name, pose in (("a", A), ("b", B))
     ]
 

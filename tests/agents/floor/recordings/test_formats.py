@@ -13,7 +13,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from tms_agents.floor.recordings.formats import read_scans
-from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, in_time
+from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, in_time, rows_of
 from tms_client.cli import CommandError
 
 #: Every way to say that nothing echoed, or that something is wrong, and a range.
@@ -65,9 +65,9 @@ def test_intensities_that_were_announced_and_never_sent_are_none(tmp_path):
     told = {"ranges": np.ones((2, 8)), "t": [1.0, 1.1], "angles": np.linspace(-1, 1, 8)}
     for intensities in ([], np.zeros((2, 0)), np.zeros((2, 3))):
         np.savez(path, intensities=intensities, **told)
-        assert read_scans(path)[0].intensities is None
+        assert read_scans(path)[0].scan(1).intensities is None
     np.savez(path, intensities=7.0 * np.ones((2, 8)), **told)
-    np.testing.assert_array_equal(read_scans(path)[0].intensities, 7.0)
+    np.testing.assert_array_equal(read_scans(path)[0].scan(1).intensities, np.full(8, 7.0))
 
 
 def test_npz_as_ros_has_it_and_times_that_stand_still(tmp_path):
@@ -87,7 +87,7 @@ def test_npz_as_ros_has_it_and_times_that_stand_still(tmp_path):
     assert found.pose == (0.0, 0.0, 0.0)
     np.testing.assert_allclose(found.sweep.angles, [-0.5, 0.0, 0.5])
     np.testing.assert_allclose(found.t, [5.0, 5.1, 5.2])
-    assert found.intensities is not None and found.intensities.shape == (3, 3)
+    np.testing.assert_array_equal(found.scan(2).intensities, np.full(3, 7.0))
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_a_wrong_csv_is_named_with_its_line(tmp_path, change, says):
         read_scans(path)
 
 
-def laser_scan(store, t, ranges, ros1=False):
+def laser_scan(store, t, ranges, ros1=False, light=()):
     sec, nanosec = int(t), round(t % 1 * 1e9)
     header = {"stamp": store.types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec), "frame_id": "laser"}
     if ros1:
@@ -199,7 +199,7 @@ def laser_scan(store, t, ranges, ros1=False):
         range_min=0.02,
         range_max=5.6,
         ranges=np.array(ranges, np.float32),
-        intensities=np.array([], np.float32),
+        intensities=np.array(light, np.float32),
     )
 
 
@@ -213,7 +213,7 @@ def check_bag(path, topics=("front_scan",)):
         np.testing.assert_allclose(one.t, [100.0, 100.1])
         np.testing.assert_allclose(one.ranges, [[1.0, np.inf, 2.0], [1.0, np.nan, 2.5]])
         np.testing.assert_allclose(one.sweep.angles, [-0.5, 0.0, 0.5])
-        assert one.intensities is None and one.sweep.model == "laser"
+        assert one.scan(0).intensities is None and one.sweep.model == "laser"
 
 
 def test_ros1_bag(tmp_path):
@@ -256,7 +256,7 @@ def test_a_bag_without_scans(tmp_path):
 def test_scans_of_several_sensors_come_in_time():
     def recorded(name, times):
         t = np.array(times)
-        return Recorded(name, None, (0.0, 0.0, 0.0), t, np.ones((len(t), 1)))
+        return Recorded(name, None, (0.0, 0.0, 0.0), t, rows_of(np.ones((len(t), 1))))
 
     order = list(in_time([recorded("a", [1.0, 2.0, 3.0]), recorded("b", [0.5, 2.5])]))
     assert order == [(1, 0), (0, 0), (0, 1), (1, 1), (0, 2)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,11 @@ from hypothesis import strategies as st
 
 from tms_agents.devices.scans import Scan, Sweep
 from tms_agents.floor.recordings.formats import read_scans
-from tms_agents.floor.recordings.recording import ScanWriter, read_recording
+from tms_agents.floor.recordings.reading import read_recording
+from tms_agents.floor.recordings.recorded import in_time
+from tms_agents.floor.recordings.recording import ScanWriter
 from tms_agents.floor.recordings.records import Damage
+from tms_client.cli import CommandError
 
 POSE = (1.0, 2.0, 0.5)
 
@@ -51,7 +56,9 @@ def test_what_is_written_is_read(tmp_path, bright, device):
     assert (found.name, found.pose, found.sweep.model) == ("a", POSE, "test")
     np.testing.assert_allclose(found.sweep.angles, one.angles)
     if bright:
-        np.testing.assert_array_equal(found.intensities, [scan.intensities for scan in scans])
+        np.testing.assert_array_equal(
+            [found.scan(n).intensities for n in range(45)], [one.intensities for one in scans]
+        )
 
 
 def test_a_long_reach_and_an_endless_one(tmp_path):
@@ -117,3 +124,33 @@ def test_it_is_compact(tmp_path):
     random = np.random.default_rng(2)
     write(path, [Scan(one, np.round(2 + random.normal(0, 0.004, 681), 3)) for _ in range(200)])
     assert path.stat().st_size < 1.0 * 200 * 681
+
+
+def test_a_long_recording_takes_little_memory(tmp_path):
+    """It is gone through scan by scan; what is in memory is a block, and a time per scan."""
+    path, one = tmp_path / "x.scans", sweep(700)
+    random = np.random.default_rng(3)
+    scans = [Scan(one, np.round(2 + random.normal(0, 0.004, 700), 3)) for _ in range(50)]
+    write(path, [scans[n % 50] for n in range(2000)])
+    tracemalloc.start()
+    recordings = read_scans(path)
+    total = sum(float(recordings[number].scan(n).ranges[0]) for number, n in in_time(recordings))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert total == pytest.approx(sum(40 * scan.ranges[0] for scan in scans))
+    assert peak < 1_500_000, "all ranges at once would be 11 MB"
+
+
+def test_the_file_that_was_opened_is_read_also_when_another_has_its_name(tmp_path):
+    """As a recording that is full gets another name while somebody plays it."""
+    path, one = tmp_path / "x.scans", sweep()
+    scans = [walls(one, n) for n in range(30)]
+    write(path, scans)
+    (found,) = read_scans(path)
+    path.rename(path.with_name("x.scans.old"))
+    write(path, [walls(one, 99)])
+    assert_holds(found, scans)
+    with path.with_name("x.scans.old").open("r+b") as file:
+        file.truncate(100)
+    with pytest.raises(CommandError, match=r"x\.scans: it changed while it was read"):
+        [found.scan(n) for n in range(30)]
