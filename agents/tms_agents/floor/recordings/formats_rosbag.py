@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from tms_agents.bags import read_messages
-from tms_agents.devices.scans import Sweep
-from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, rows_of
+from tms_agents.devices.scans import Array, Sweep
+from tms_agents.floor.recordings.recorded import Recorded, clean_ranges
 
 
 def read_rosbag(path: Path) -> list[Recorded]:
@@ -43,6 +43,9 @@ def _recordings(topics: dict[str, list[Any]]) -> Iterator[Recorded]:
         )
         name = re.sub(r"[^A-Za-z0-9._-]+", "_", topic.strip("/")) or "scan"
         cleaned = clean_ranges(ranges, sweep.range_min_m, sweep.range_max_m)
-        whole = all(len(one.intensities) == shape for one in scans)
-        intensities = np.array([one.intensities for one in scans], dtype=np.float64) if whole else None
-        yield Recorded(name, sweep, (0.0, 0.0, 0.0), t, rows_of(cleaned, intensities if shape else None))
+        yield Recorded(name, sweep, (0.0, 0.0, 0.0), t, list(zip(cleaned, map(_intensities, scans), strict=True)))
+
+
+def _intensities(scan: Any) -> Array | None:
+    """Many drivers announce some and send none, or send some now and then."""
+    return np.array(scan.intensities, dtype=np.float64) if 0 < len(scan.intensities) == len(scan.ranges) else None

@@ -62,6 +62,8 @@ class ScanWriter:
         if known is None or known[0] is not scan.sweep or known[1] != pose:
             self._write(sensor)
             self._describe(sensor, pose, scan.sweep)
+        if (before := self._waiting.get(sensor)) and _has(before[-1][1]) != _has(scan):
+            self._write(sensor)  # the scans of a block are alike
         waiting = self._waiting.setdefault(sensor, [])
         waiting.append((t, scan))
         self.written += 1
@@ -111,6 +113,11 @@ class ScanWriter:
 
     def _record(self, kind: bytes, body: bytes) -> None:
         self._file.write(HEAD.pack(kind, len(body), zlib.crc32(body)) + body)
+
+
+def _has(scan: Scan) -> tuple[bool, bool]:
+    """Whether it comes with intensities, and with a time of the device."""
+    return scan.intensities is not None, scan.device_time_s is not None
 
 
 def _next_number(file: IO[bytes], damage: Damage) -> int:

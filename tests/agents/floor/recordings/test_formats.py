@@ -243,6 +243,19 @@ def test_ros2_bag_of_two_lasers(tmp_path, kind):
     check_bag(file, ("front_scan", "rear"))
 
 
+def test_scans_of_a_bag_have_the_intensities_that_they_came_with(tmp_path):
+    path, store = tmp_path / "some.bag", get_typestore(Stores.ROS1_NOETIC)
+    with Ros1Writer(path) as writer:
+        connection = writer.add_connection("/scan", "sensor_msgs/msg/LaserScan", typestore=store)
+        for n, light in enumerate([[1.0, 2.0, 3.0], [], [4.0, 5.0, 6.0]]):
+            message = laser_scan(store, 100 + n, [1.0, 2.0, 3.0], ros1=True, light=light)
+            writer.write(connection, int((100 + n) * 1e9), store.serialize_ros1(message, connection.msgtype))
+    (found,) = read_scans(path)
+    np.testing.assert_array_equal(found.scan(0).intensities, [1.0, 2.0, 3.0])
+    assert found.scan(1).intensities is None
+    np.testing.assert_array_equal(found.scan(2).intensities, [4.0, 5.0, 6.0])
+
+
 def test_a_bag_without_scans(tmp_path):
     path, store = tmp_path / "quiet.bag", get_typestore(Stores.ROS1_NOETIC)
     with Ros1Writer(path) as writer:

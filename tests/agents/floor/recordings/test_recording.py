@@ -154,3 +154,16 @@ def test_the_file_that_was_opened_is_read_also_when_another_has_its_name(tmp_pat
         file.truncate(100)
     with pytest.raises(CommandError, match=r"x\.scans: it changed while it was read"):
         [found.scan(n) for n in range(30)]
+
+
+def test_every_scan_has_the_intensities_that_it_came_with(tmp_path):
+    path, one = tmp_path / "x.scans", sweep()
+    scans = [walls(one, n, bright=n < 7 or 13 <= n < 16 or n > 30) for n in range(45)]
+    write(path, scans)
+    (found,) = read_scans(path)
+    assert_holds(found, scans)
+    for n, scan in enumerate(scans):
+        if scan.intensities is None:
+            assert found.scan(n).intensities is None
+        else:
+            np.testing.assert_array_equal(found.scan(n).intensities, scan.intensities)
