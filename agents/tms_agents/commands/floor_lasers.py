@@ -71,8 +71,12 @@ def record(arguments: argparse.Namespace) -> int:
         raise CommandError(f"{arguments.out}: {getattr(error, 'strerror', None) or error}") from error
     if words := writer.damage.in_words():
         warn(f"{arguments.out}: {words}")
-    with contextlib.closing(writer), contextlib.suppress(asyncio.CancelledError):
-        asyncio.run(until_signalled(_record(config, arguments, writer)))
+    try:
+        with contextlib.closing(writer), contextlib.suppress(asyncio.CancelledError):
+            asyncio.run(until_signalled(_record(config, arguments, writer)))
+    except OSError as error:
+        kept = f"{writer.kept} scans were kept" if writer.kept else "no scan was kept"
+        raise CommandError(f"{arguments.out}: {error.strerror or error}; {kept}") from error
     _say(f"{arguments.out}: {writer.written} scans")
     return 0 if writer.written else 1
 

@@ -7,6 +7,7 @@ writes.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import zlib
@@ -36,25 +37,22 @@ class ScanWriter:
         self.path = path
         #: What of the file that was there cannot be read.
         self.damage = Damage()
-        self._file: IO[bytes] = path.open("ab+")
+        self._file = path.open("ab+", buffering=0)
         try:
             self._next = _next_number(self._file, self.damage)
+            #: Bytes on the disk.
+            self.size = self.damage.whole
             if self.damage.tail <= _TORN:  # nothing that can be read comes after it
-                self._file.truncate(self.damage.whole)
-            if self.size == 0:
-                self._file.write(MAGIC)
+                self._file.truncate(self.size)
+            else:
+                self.size += self.damage.tail
         except BaseException:
             self._file.close()
             raise
         self._numbers: dict[str, tuple[Sweep, Pose, int, float]] = {}
         self._waiting: dict[str, list[tuple[float, Scan]]] = {}
-        #: Scans taken so far.
-        self.written = 0
-
-    @property
-    def size(self) -> int:
-        """Bytes on the disk."""
-        return self._file.seek(0, os.SEEK_END)
+        #: Scans taken so far, and those of them that are in the file.
+        self.written = self.kept = 0
 
     def add(self, sensor: str, pose: Pose, t: float, scan: Scan) -> None:
         """A scan with the time of its first beam; written with others after about a second."""
@@ -75,15 +73,17 @@ class ScanWriter:
         """Everything onto the disk."""
         for sensor in self._waiting:
             self._write(sensor)
-        self._file.flush()
         os.fsync(self._file.fileno())
 
     def close(self) -> None:
+        """A file without anything in it is removed."""
         if not self._file.closed:
             try:
                 self.flush()
             finally:
                 self._file.close()
+                if self.size == 0:
+                    self.path.unlink(missing_ok=True)
 
     def _describe(self, sensor: str, pose: Pose, sweep: Sweep) -> None:
         # Whole millimetres, as devices have them, unless the reach needs more room.
@@ -110,9 +110,20 @@ class ScanWriter:
             _, _, number, unit = self._numbers[sensor]
             self._waiting[sensor] = []
             self._record(b"B", packed(number, unit, scans))
+            self.kept += len(scans)
 
     def _record(self, kind: bytes, body: bytes) -> None:
-        self._file.write(HEAD.pack(kind, len(body), zlib.crc32(body)) + body)
+        """All of it, or nothing where the disk is full."""
+        data = memoryview(MAGIC * (self.size == 0) + HEAD.pack(kind, len(body), zlib.crc32(body)) + body)
+        left = data
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                self._file.truncate(self.size)
+            raise
+        self.size += len(data)
 
 
 def _has(scan: Scan) -> tuple[bool, bool]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import resource
 import tracemalloc
 
 import numpy as np
@@ -34,10 +36,9 @@ def walls(sweep, seed, *, bright=False, device=False):
 
 
 def write(path, scans, name="a", start=0):
-    writer = ScanWriter(path)
-    for n, scan in enumerate(scans, start):
-        writer.add(name, POSE, 100 + 0.1 * n, scan)
-    writer.close()
+    with contextlib.closing(ScanWriter(path)) as writer:
+        for n, scan in enumerate(scans, start):
+            writer.add(name, POSE, 100 + 0.1 * n, scan)
 
 
 def assert_holds(found, scans):
@@ -167,3 +168,24 @@ def test_every_scan_has_the_intensities_that_it_came_with(tmp_path):
             assert found.scan(n).intensities is None
         else:
             np.testing.assert_array_equal(found.scan(n).intensities, scan.intensities)
+
+
+def test_a_full_disk_leaves_whole_records(tmp_path):
+    path, one = tmp_path / "x.scans", sweep(200)
+    scans = [walls(one, n) for n in range(400)]
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            write(path, scans)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    damage = Damage()
+    (found,) = read_recording(path, damage)
+    assert_holds(found, scans[: len(found)])
+    assert len(found) > 20 and not damage.in_words()
+
+
+def test_nothing_recorded_is_no_file(tmp_path):
+    ScanWriter(tmp_path / "x.scans").close()
+    assert not (tmp_path / "x.scans").exists()
