@@ -110,13 +110,16 @@ def _scans(arguments: argparse.Namespace, config: FloorConfig, names: list[str],
     seconds = usual_s if arguments.seconds is None else arguments.seconds
     if not 0.5 <= seconds <= 3600:
         raise CommandError("--seconds is 0.5 to 3600")
-    _say(f"Looking for {seconds:g} s{'; walk through the whole room' if len(names) > 1 else ''} ...")
 
     async def look() -> list[Recorded]:
         await _require_no_agent(config, "stop it first")
+        _say(f"Looking for {seconds:g} s{'; walk through the whole room' if len(names) > 1 else ''} ...")
         return await gather(config, names, seconds)
 
-    return asyncio.run(until_signalled(look()))
+    try:
+        return asyncio.run(until_signalled(look()))
+    except asyncio.CancelledError:  # by Ctrl-C: nothing was found out, nothing is to be said
+        raise KeyboardInterrupt from None
 
 
 async def _require_no_agent(config: FloorConfig, advice: str) -> None:

@@ -7,6 +7,7 @@ import math
 import os
 import pty
 import resource
+import signal
 import subprocess
 import sys
 
@@ -63,3 +64,10 @@ def test_a_disk_that_becomes_full_is_one_line(floor, tmp_path):
     kept = sum(map(len, read_scans(scans)))
     assert (code, err) == (2, f"tms: {scans}: File too large; {kept} scans were kept\n") and kept > 10
     assert scans.stat().st_size <= 60_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_calibrate_is_quiet_when_it_is_broken_off(floor, tmp_path, number):
+    arguments = ["calibrate", "--outline", CORNERS, "--seconds", "50"]
+    assert floor(*arguments, signalled=number, after="Looking for 50 s") == (130, "", "")
+    assert not list(tmp_path.glob("*.calibration.toml*"))
