@@ -71,8 +71,12 @@ def read_config(path: Path, model: type[C]) -> C:
     try:
         return model.model_validate(raw, context={"folder": path.resolve().parent})
     except ValidationError as error:
-        faults = [_in_words(one["loc"], one["msg"]) for one in error.errors(include_url=False)[:5]]
-        raise CommandError(f"{path}: {'; '.join(faults)}") from error
+        raise CommandError(f"{path}: {faults_of(error)}") from error
+
+
+def faults_of(error: ValidationError) -> str:
+    """What is wrong, and where, in one line."""
+    return "; ".join(_in_words(one["loc"], one["msg"]) for one in error.errors(include_url=False)[:5])
 
 
 def misplaced(place: Sequence[str | int], why: str) -> ValidationError:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace as changed
 from typing import Any
 
+from pydantic import ValidationError
+
 from tms_agents.commands.floor_files import result, warn, write_file
-from tms_agents.config import read_config
+from tms_agents.config import faults_of, read_config
 from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.recordings.formats import read_scans
@@ -65,13 +68,17 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
             names = ", ".join(one.name for one in recordings)
             raise CommandError(f"--pose is given {len(given)} times, there are {len(recordings)} sensors: {names}")
         recordings = [changed(one, pose=pose) for one, pose in zip(recordings, given, strict=True)]
-    config = config_of(recordings, like)
-    return config, recordings
+    try:
+        return config_of(recordings, like), recordings
+    except ValidationError as error:
+        raise CommandError(f"{', '.join(map(str, arguments.scans))}: {faults_of(error)}") from error
 
 
 def _pose(text: str) -> Pose:
     try:
         x, y, theta = map(float, text.split(","))
+        if not all(map(math.isfinite, (x, y, theta))):
+            raise ValueError
     except ValueError:
         raise CommandError(f"--pose {text!r}: it is x,y,theta (metres, radians)") from None
     return (x, y, theta)

@@ -47,8 +47,10 @@ def _tell(told: dict[str, str], text: str, number: int) -> None:
         return  # a remark
     if name not in (*_NUMBERS, *_WORDS):
         raise ValueError(f"line {number}: {name!r} is unknown (there are {', '.join((*_NUMBERS, *_WORDS))})")
-    if name in _NUMBERS and not _is_number(value):
+    if name in _NUMBERS and not (_is_number(value) or (name == "range_max" and value == "inf")):
         raise ValueError(f"line {number}: {name} = {value!r} is no number")
+    if name == "pose" and (len(_pose(value)) != 3 or not all(map(_is_number, _pose(value)))):
+        raise ValueError(f"line {number}: pose = {value!r}: it is x y yaw")
     told[name] = value
 
 
@@ -84,18 +86,16 @@ def _recorded(name: str, told: dict[str, str], lines: list[list[float]]) -> Reco
         model=told.get("model", ""),
     )
     rows = rows_of(clean_ranges(ranges, range_min, range_max))
-    return Recorded(name, sweep, _pose(told.get("pose", "0 0 0")), t, rows)
+    x, y, yaw = map(float, _pose(told.get("pose", "0 0 0")))
+    return Recorded(name, sweep, (x, y, yaw), t, rows)
 
 
-def _pose(text: str) -> tuple[float, float, float]:
-    parts = text.replace(",", " ").split()
-    if len(parts) != 3 or not all(map(_is_number, parts)):
-        raise ValueError(f"pose = {text!r}: it is x y yaw")
-    return (float(parts[0]), float(parts[1]), float(parts[2]))
+def _pose(text: str) -> list[str]:
+    return text.replace(",", " ").split()
 
 
 def _is_number(text: str) -> bool:
     try:
-        return not math.isnan(float(text))
+        return math.isfinite(float(text))
     except ValueError:
         return False

@@ -173,7 +173,10 @@ def test_csv(tmp_path):
         (("1.402", "1.4o2"), "line 7: could not convert"),
         (("10.1,1.405,", "10.1,"), "line 9: 3 cells, the first scan has 4"),
         (("10.1,1.405", "inf,1.405"), "line 9: it begins with no time"),
-        (("pose = 1 2 0.5", "pose = 1 2"), "it is x y yaw"),
+        (("pose = 1 2 0.5", "pose = 1 2"), "line 5: pose = '1 2': it is x y yaw"),
+        (("pose = 1 2 0.5", "pose = inf 0 0"), "line 5: pose = 'inf 0 0': it is x y yaw"),
+        (("angle_min = -0.5", "angle_min = inf"), "line 1: angle_min = 'inf' is no number"),
+        (("range_min = 0.02", "time_increment = inf"), "line 4: time_increment = 'inf' is no number"),
         (("pose = 1 2 0.5", "unit = inch"), "it is m or mm"),
     ],
 )
