@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,9 +21,20 @@ def main(argv: Sequence[str]) -> int:
     _watch(_command(kinds, "watch", "see live what the lasers see, or what recordings hold", watch))
     _calibrate(_command(kinds, "calibrate", "find out where a laser is", calibrate))
     _record(_command(kinds, "record", "record what the lasers see", record))
-    arguments = parser.parse_args(argv)
+    arguments = parser.parse_args(_joined(argv))
     done: int = arguments.work(arguments)
     return done
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """``--pose -1,2,0`` as ``--pose=-1,2,0``: argparse takes what begins with a minus for an option."""
+    found: list[str] = []
+    for one in argv:
+        if found and found[-1] in ("--pose", "--outline") and re.match(r"-[\d.]", one):
+            found[-1] += f"={one}"
+        else:
+            found.append(one)
+    return found
 
 
 def _command(kinds: Any, name: str, text: str, work: Callable[[argparse.Namespace], int]) -> argparse.ArgumentParser:

@@ -121,6 +121,15 @@ def test_bad_input_is_one_line(story_scans, monkeypatch, tmp_path, capsys, argum
     assert says in err and err.startswith("tms: ") and err.count("\n") == 1 and not out
 
 
+def test_a_pose_may_begin_with_a_minus(story_scans, tmp_path):
+    out, found = tmp_path / "out.json", []
+    for pose in (["--pose=-1,2,0"], ["--pose", "-1,2,0"], ["--pose", "-.5,2,0"]):
+        arguments = ["--config", str(story_scans / "floor.toml"), "--out", str(out), *pose]
+        assert cli.main(["floor", "replay", str(story_scans / "story.npz"), *arguments]) == 0
+        found.append(json.loads(out.read_text())[-1]["labels"])
+    assert found[0] == found[1] and found[2][0]["x"] == pytest.approx(found[0][0]["x"] + 0.5, abs=1e-3)
+
+
 def test_watch_a_recording(story_scans, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "90")
     monkeypatch.setenv("LINES", "30")
