@@ -17,7 +17,7 @@ from tms_agents.config import faults_of, read_config
 from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.recordings.formats import read_scans
-from tms_agents.floor.recordings.recorded import Recorded
+from tms_agents.floor.recordings.recorded import Recorded, within
 from tms_agents.floor.recordings.replay import Replay, Tracks
 from tms_agents.floor.settings import Pose
 from tms_agents.floor.watch.picture import tracks_png
@@ -54,14 +54,15 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
     poses: dict[str, Pose] = {}
     if arguments.config is not None:
         like, poses = calibrated(read_config(arguments.config, FloorConfig), arguments.config)
-    scales = {} if like is None else {one.name: one.range_scale for one in like.lasers}
+    lasers = {} if like is None else {one.name: one for one in like.lasers}
     recordings: list[Recorded] = []
     for one in [one for path in arguments.scans for one in read_scans(path, warn)]:
         name, count = one.name, 2
         while name in [other.name for other in recordings]:
             name, count = f"{one.name} {count}", count + 1
-        pose, scale = poses.get(one.name, one.pose), scales.get(one.name)
-        recordings.append(changed(one, name=name, pose=pose, range_scale=scale))
+        pose, laser = poses.get(one.name, one.pose), lasers.get(one.name)
+        one = one if laser is None else changed(within(one, laser.range_max_m), range_scale=laser.range_scale)
+        recordings.append(changed(one, name=name, pose=pose))
     if arguments.pose:
         given = [_pose(text) for text in arguments.pose]
         if len(given) != len(recordings):

@@ -121,6 +121,20 @@ def test_bad_input_is_one_line(story_scans, monkeypatch, tmp_path, capsys, argum
     assert says in err and err.startswith("tms: ") and err.count("\n") == 1 and not out
 
 
+def test_what_is_beyond_the_reach_that_is_told_is_not_there(story_scans, tmp_path, capsys):
+    """The thing lies 1.66 m off; replay and watch leave it out, as the agent does."""
+    out, config = tmp_path / "out.json", tmp_path / "floor.toml"
+    told = (story_scans / "floor.toml").read_text()
+    seen = []
+    for reach in (1.8, 1.5):
+        config.write_text(told.replace('name = "laser"', f'name = "laser"\nrange_max_m = {reach}'))
+        arguments = [str(story_scans / "story.scans"), "--config", str(config)]
+        assert cli.main(["floor", "replay", *arguments, "--out", str(out)]) == 0
+        assert cli.main(["floor", "watch", *arguments, "--once", "--wait", "1000"]) == 0
+        seen.append((len(json.loads(out.read_text())[-1]["labels"]), " thing " in capsys.readouterr().out))
+    assert seen == [(1, True), (0, False)]
+
+
 def test_a_pose_may_begin_with_a_minus(story_scans, tmp_path):
     out, found = tmp_path / "out.json", []
     for pose in (["--pose=-1,2,0"], ["--pose", "-1,2,0"], ["--pose", "-.5,2,0"]):

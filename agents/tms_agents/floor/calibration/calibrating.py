@@ -18,7 +18,7 @@ from tms_agents.floor.calibration.walkers import Registration, register, walker_
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.lasers import Laser
 from tms_agents.floor.recordings.formats import Say, read_scans
-from tms_agents.floor.recordings.recorded import Recorded, forward, thinned
+from tms_agents.floor.recordings.recorded import Recorded, forward, thinned, within
 from tms_agents.floor.runner import listen
 from tms_agents.floor.scan.walls import MATCHED_M, Fit, fit_walls
 from tms_agents.floor.settings import FloorSettings, Pose
@@ -87,8 +87,11 @@ def from_files(paths: Sequence[Path], config: FloorConfig, names: Sequence[str],
         chosen = recordings
     else:
         raise CommandError(f"the recordings hold {', '.join(sorted(by_name))}, wanted are {', '.join(names)}")
-    poses = {one.name: one.pose.pose for one in config.lasers}
-    return [replace(one, name=name, pose=poses[name]) for name, one in zip(names, chosen, strict=True)]
+    lasers = {one.name: one for one in config.lasers}
+    return [
+        replace(within(one, lasers[name].range_max_m), name=name, pose=lasers[name].pose.pose)
+        for name, one in zip(names, chosen, strict=True)
+    ]
 
 
 def outline_of(config: FloorConfig, given: str | None) -> list[tuple[float, float]]:

@@ -98,6 +98,13 @@ def forward(one: Recorded) -> Recorded:
     return one if rising.all() else _chosen(one, np.flatnonzero(rising))
 
 
+def within(one: Recorded, reach_m: float | None) -> Recorded:
+    """As of a sensor of which nothing farther than that is used."""
+    if reach_m is None or reach_m >= one.sweep.range_max_m:
+        return one
+    return replace(one, sweep=replace(one.sweep, range_max_m=reach_m))
+
+
 def thinned(one: Recorded, most: int) -> Recorded:
     """At most so many of the scans, evenly spread: for what does not need all of them."""
     return one if len(one) <= most else _chosen(one, np.linspace(0, len(one) - 1, most).round().astype(np.intp))

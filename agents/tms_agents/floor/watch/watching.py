@@ -97,17 +97,14 @@ def play(
 
 def config_of(recordings: Sequence[Recorded], like: FloorConfig | None = None) -> FloorConfig:
     """A configuration with the lasers of recordings; scene and settings from ``like``."""
-    known = {one.name: one for one in like.lasers} if like is not None else {}
     lasers = []
     for one in recordings:
         x, y, theta = one.pose
-        old = known.get(one.name)
         lasers.append(
             {
                 "name": one.name,
                 "source": {"kind": "scip", "device": "/dev/null"},
                 "pose": {"x": x, "y": y, "theta": float(np.arctan2(np.sin(theta), np.cos(theta)))},
-                "range_max_m": None if old is None else old.range_max_m,
                 "range_scale": one.range_scale,
             }
         )
