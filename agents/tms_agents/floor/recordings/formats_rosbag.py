@@ -27,25 +27,41 @@ def read_rosbag(path: Path) -> list[Recorded]:
 
 def _recordings(topics: dict[str, list[Any]]) -> Iterator[Recorded]:
     for topic, scans in topics.items():
-        first = scans[0]
-        shape = len(first.ranges)
+        shape = len(scans[0].ranges)
         if any(len(one.ranges) != shape for one in scans):
             raise ValueError(f"topic {topic}: scans with different numbers of beams")
         t = np.array([one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec for one in scans])
-        ranges = np.array([one.ranges for one in scans], dtype=np.float64).reshape(len(scans), shape)
-        sweep = Sweep(
-            angles=float(first.angle_min) + float(first.angle_increment) * np.arange(shape, dtype=np.float64),
-            time_increment_s=float(first.time_increment),
-            period_s=float(first.scan_time) or (float(np.median(np.diff(t))) if len(t) > 1 else 0.1),
-            range_min_m=float(first.range_min),
-            range_max_m=float(first.range_max),
-            model=str(first.header.frame_id),
+        sweep = _sweep(scans[0], float(np.median(np.diff(t))) if len(t) > 1 else 0.1)
+        numbers = [*sweep.angles, sweep.time_increment_s, sweep.period_s, sweep.range_min_m]
+        if not np.isfinite(numbers).all() or np.isnan(sweep.range_max_m):
+            raise ValueError(f"topic {topic}: what it tells of the laser is no number")
+        cleaned = clean_ranges(
+            np.array([_numbers(one.ranges) for one in scans]).reshape(len(scans), shape),
+            sweep.range_min_m,
+            sweep.range_max_m,
         )
         name = re.sub(r"[^A-Za-z0-9._-]+", "_", topic.strip("/")) or "scan"
-        cleaned = clean_ranges(ranges, sweep.range_min_m, sweep.range_max_m)
         yield Recorded(name, sweep, (0.0, 0.0, 0.0), t, list(zip(cleaned, map(_intensities, scans), strict=True)))
+
+
+def _sweep(scan: Any, between_s: float) -> Sweep:
+    with np.errstate(invalid="ignore"):
+        angles = float(scan.angle_min) + float(scan.angle_increment) * np.arange(len(scan.ranges), dtype=np.float64)
+    return Sweep(
+        angles=angles,
+        time_increment_s=float(scan.time_increment),
+        period_s=float(scan.scan_time) or between_s,
+        range_min_m=float(scan.range_min),
+        range_max_m=float(scan.range_max),
+        model=str(scan.header.frame_id),
+    )
 
 
 def _intensities(scan: Any) -> Array | None:
     """Many drivers announce some and send none, or send some now and then."""
-    return np.array(scan.intensities, dtype=np.float64) if 0 < len(scan.intensities) == len(scan.ranges) else None
+    return _numbers(scan.intensities) if 0 < len(scan.intensities) == len(scan.ranges) else None
+
+
+def _numbers(given: Any) -> Array:
+    with np.errstate(invalid="ignore"):  # a nan of a kind that numpy warns of
+        return np.array(given, dtype=np.float64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -257,6 +259,41 @@ def test_scans_of_a_bag_have_the_intensities_that_they_came_with(tmp_path):
     np.testing.assert_array_equal(found.scan(0).intensities, [1.0, 2.0, 3.0])
     assert found.scan(1).intensities is None
     np.testing.assert_array_equal(found.scan(2).intensities, [4.0, 5.0, 6.0])
+
+
+@pytest.mark.parametrize("kind", ["mcap", "bag", "db3"])
+def test_a_damaged_bag_is_one_line_or_is_read(tmp_path, kind):
+    """A byte is wrong, or the end is missing, at many places."""
+    path = tmp_path / f"x.{kind}"
+    whole = bag_of(tmp_path / "whole", kind)
+    for n in range(15):
+        at = len(whole) * n // 15
+        for damaged in (whole[:at], whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :]):
+            path.write_bytes(damaged)
+            with contextlib.suppress(CommandError):
+                read_scans(path)
+    # Found in practice: the last length of an mcap is wrong.
+    path.write_bytes(whole[:-40] + b"\xff" * 12 + whole[-28:])
+    if kind == "mcap":
+        with pytest.raises(CommandError, match="the bag cannot be read"):
+            read_scans(path)
+
+
+def bag_of(path, kind):
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.ROS2_HUMBLE)
+    plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+    with Ros1Writer(path) if kind == "bag" else Ros2Writer(path, version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/scan", "sensor_msgs/msg/LaserScan", typestore=store)
+        for t, ranges in SCANS * 10:
+            message = laser_scan(store, t, ranges, ros1=kind == "bag")
+            pack = store.serialize_ros1 if kind == "bag" else store.serialize_cdr
+            writer.write(connection, int(t * 1e9), pack(message, connection.msgtype))
+    return (path if kind == "bag" else next(path.glob(f"*.{kind}"))).read_bytes()
+
+
+def test_a_folder_that_is_no_bag(tmp_path):
+    with pytest.raises(CommandError, match=r"the folder is no bag: there is no metadata\.yaml in it"):
+        read_scans(tmp_path)
 
 
 def test_a_bag_without_scans(tmp_path):
