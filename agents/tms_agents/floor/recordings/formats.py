@@ -31,10 +31,16 @@ def read_scans(path: Path, say: Say = log.warning) -> list[Recorded]:
         raise CommandError(f"{path}: {error.strerror or error}") from error
     except ValueError as error:
         raise CommandError(f"{path}: {error}") from error
-    found = [forward(one) for one in found if len(one)]
-    if not found:
+    if not any(map(len, found)):
         raise CommandError(f"{path}: it holds no scan")
-    return found
+    return [_forward(path, one, say) for one in found if len(one)]
+
+
+def _forward(path: Path, one: Recorded, say: Say) -> Recorded:
+    usable = forward(one)
+    if left_out := len(one) - len(usable):
+        say(f"{path}: {left_out} of {len(one)} scans of {one.name} are left out: they are not later than one before")
+    return usable
 
 
 def _read(path: Path, say: Say) -> list[Recorded]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tms_agents.devices.scans import Array, Sweep
+from tms_agents.floor.recordings.checks import check_ranges, check_times, period_of
 from tms_agents.floor.recordings.recorded import Recorded, clean_ranges, rows_of
 
 _MOST_BEAMS = 100_000
@@ -41,6 +42,7 @@ def read_npz(path: Path) -> Recorded:
     range_min, range_max = _number(values, "range_min", 0.02), _number(values, "range_max", np.inf)
     if not 0 <= range_min < range_max:
         raise ValueError(f"range_min {range_min:g} and range_max {range_max:g} are no reach")
+    check_ranges(ranges)
     sweep = Sweep(
         angles=_angles(values, beams),
         time_increment_s=_number(values, "time_increment", 0.0),
@@ -49,6 +51,7 @@ def read_npz(path: Path) -> Recorded:
         range_max_m=range_max,
         model=str(values["model"]) if "model" in values else "",
     )
+    check_times(sweep)
     # Some drivers announce intensities and send none.
     bright = "intensities" in values and np.shape(values["intensities"]) == ranges.shape
     intensities = _array(values, "intensities", 2) if bright else None
@@ -59,10 +62,11 @@ def read_npz(path: Path) -> Recorded:
 def _array(values: dict[str, Any], name: str, dimensions: int) -> Array:
     if name not in values:
         raise ValueError(f"it has no {name!r}")
-    try:
-        array = np.asarray(values[name], dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name!r} is not made of numbers") from error
+    given = np.asarray(values[name])
+    if given.dtype.kind not in "iufb":
+        raise ValueError(f"{name!r} is not made of numbers, but of {given.dtype}")
+    with np.errstate(over="ignore"):  # of more digits than usual: what is beyond them is endless
+        array = given.astype(np.float64)
     if array.ndim != dimensions:
         raise ValueError(f"{name!r} has {array.ndim} dimensions instead of {dimensions}")
     return array
@@ -105,4 +109,4 @@ def _period(values: dict[str, Any], t: Array) -> float:
         return period
     if (rate := _number(values, "scan_rate", 0.0)) > 0:
         return 1.0 / rate
-    return float(np.median(np.diff(t))) if len(t) > 1 else 0.1
+    return period_of(t)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tms_agents.bags import read_messages
 from tms_agents.devices.scans import Array, Sweep
+from tms_agents.floor.recordings.checks import period_of
 from tms_agents.floor.recordings.recorded import Recorded, clean_ranges
 
 
@@ -31,7 +32,7 @@ def _recordings(topics: dict[str, list[Any]]) -> Iterator[Recorded]:
         if any(len(one.ranges) != shape for one in scans):
             raise ValueError(f"topic {topic}: scans with different numbers of beams")
         t = np.array([one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec for one in scans])
-        sweep = _sweep(scans[0], float(np.median(np.diff(t))) if len(t) > 1 else 0.1)
+        sweep = _sweep(scans[0], period_of(t))
         numbers = [*sweep.angles, sweep.time_increment_s, sweep.period_s, sweep.range_min_m]
         if not np.isfinite(numbers).all() or np.isnan(sweep.range_max_m):
             raise ValueError(f"topic {topic}: what it tells of the laser is no number")

@@ -105,7 +105,13 @@ def test_npz_as_ros_has_it_and_times_that_stand_still(tmp_path):
         ({"ranges": np.empty((2, 0))}, "a scan has 0 beams"),
         ({"sensor_pose": [1.0]}, "x, y, yaw"),
         ({"range_min": 9.0}, "no reach"),
-        ({"ranges": np.empty((0, 3)), "t": []}, "it holds no scan"),
+        ({"ranges": 1000.0 + np.arange(6.0).reshape(2, 3)}, "they seem to be millimetres"),
+        ({"ranges": np.full((2, 3), np.nan)}, "every range is nan"),
+        ({"ranges": np.ones((2, 3)) + 1j}, "'ranges' is not made of numbers, but of complex128"),
+        ({"time_increment": np.inf}, "time_increment inf s is no time from beam to beam"),
+        ({"time_increment": -1e-4}, "time_increment -0.0001 s is no time from beam to beam"),
+        ({"time_increment": 0.6}, "time_increment 0.6 s: a sweep would last 1.2 s, and the next begins after 1 s"),
+        ({"ranges": np.empty((0, 3)), "t": np.empty(0)}, "it holds no scan"),
     ],
 )
 def test_a_wrong_npz_is_named_in_one_line(tmp_path, change, says):
@@ -164,6 +170,19 @@ def test_csv(tmp_path):
     path.write_text(CSV.replace("1.40", "140").replace("0.006", "6").replace("5.6\n", "5600\n", 2) + "# unit = mm\n")
     (other,) = read_scans(path)
     np.testing.assert_allclose(other.ranges[:, 0], [1.402, 1.405])
+    assert other.sweep.range_max_m == pytest.approx(5.6), "it is told in the unit of the ranges"
+    path.write_text("\ufeff" + CSV, encoding="utf-8")  # as some editors begin a file
+    assert len(read_scans(path)[0]) == 2
+    path.write_text(CSV.replace("range_max = 5.6", "range_max = inf"))
+    assert read_scans(path)[0].sweep.range_max_m == np.inf
+
+
+def test_scans_that_are_left_out_are_said(tmp_path):
+    path, said = tmp_path / "back.csv", []
+    path.write_text(CSV.split("10.0,")[0] + "".join(f"{50 - n / 10},1.4,1.5,1.6\n" for n in range(40)))
+    (found,) = read_scans(path, said.append)
+    assert len(found) == 1 and found.sweep.period_s > 0
+    assert said == [f"{path}: 39 of 40 scans of back are left out: they are not later than one before"]
 
 
 @pytest.mark.parametrize(
@@ -179,7 +198,15 @@ def test_csv(tmp_path):
         (("pose = 1 2 0.5", "pose = inf 0 0"), "line 5: pose = 'inf 0 0': it is x y yaw"),
         (("angle_min = -0.5", "angle_min = inf"), "line 1: angle_min = 'inf' is no number"),
         (("range_min = 0.02", "time_increment = inf"), "line 4: time_increment = 'inf' is no number"),
-        (("pose = 1 2 0.5", "unit = inch"), "it is m or mm"),
+        (("pose = 1 2 0.5", "unit = inch"), "line 5: unit = 'inch': it is m or mm"),
+        (("range_max = 5.6", "range_max = 0"), "line 3: range_max = 0: no laser reaches 0 mm only"),
+        (("range_max = 5.6", "range_max = -5.6"), "line 3: range_max = -5.6: no laser reaches"),
+        (("range_min = 0.02", "range_min = 6"), "line 4: range_max is not more than range_min"),
+        (("range_min = 0.02", "range_min = -1"), "line 4: range_min = -1: it is 0 or more"),
+        (("pose = 1 2 0.5", "unit = mm"), "line 3: range_max = 5.6: no laser reaches 5.6 mm only"),
+        (("range_min = 0.02", "time_increment = 0.1"), "a sweep would last 0.2 s"),
+        (("1.402,,inf\n\n10.1,1.405,0.006,5.6", "1402,1403,1404"), "they seem to be millimetres"),
+        (("1.402,,inf\n\n10.1,1.405,0.006,5.6", "nan,nan,nan"), "every range is nan"),
     ],
 )
 def test_a_wrong_csv_is_named_with_its_line(tmp_path, change, says):
