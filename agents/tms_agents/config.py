@@ -65,7 +65,11 @@ def read_config(path: Path, model: type[C]) -> C:
     """
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except FileNotFoundError as error:
+        raise CommandError(f"{path}: no such file") from error
+    except OSError as error:
+        raise CommandError(f"{path}: {error.strerror or error}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise CommandError(f"{path}: {error}") from error
     _from_environment(raw)
     try:
