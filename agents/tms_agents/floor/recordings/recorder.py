@@ -14,6 +14,8 @@ log = logging.getLogger(__name__)
 #: Scans that wait for the disk; more are left out.
 _WAITING = 2000
 _RETRY_S = 60.0
+#: That scans are left out is said so often.
+_SAY_S = 60.0
 
 
 class Recorder:
@@ -25,12 +27,16 @@ class Recorder:
         self._waiting = 0
         self._writer: ScanWriter | None = None
         self._off_until = float("-inf")
-        self.left_out = 0
+        self._say_at = float("-inf")
+        self.left_out = self._recorded = 0
 
     def hear(self, laser: str, pose: Pose, t: float, scan: Scan) -> None:
         """To be called from one thread; returns at once."""
         if self._waiting >= _WAITING:
             self.left_out += 1
+            if t >= self._say_at:
+                self._say_at = t + _SAY_S
+                log.warning("recording %s: the disk is too slow; %d scans left out so far", self._path, self.left_out)
             return
         self._waiting += 1
         self._thread.submit(self._write, laser, pose, t, scan)
@@ -39,6 +45,8 @@ class Recorder:
         """After everything is on the disk."""
         self._thread.submit(self._end)
         self._thread.shutdown()
+        level = logging.WARNING if self.left_out else logging.INFO
+        log.log(level, "recording %s: %d scans, %d left out", self._path, self._recorded, self.left_out)
 
     def _write(self, laser: str, pose: Pose, t: float, scan: Scan) -> None:
         self._waiting -= 1
@@ -55,6 +63,7 @@ class Recorder:
                 if words := self._writer.damage.in_words():
                     log.warning("recording %s: %s", self._path, words)
             self._writer.add(laser, pose, t, scan)
+            self._recorded += 1
         except (OSError, ValueError) as error:
             log.warning("recording %s: %s; nothing is recorded for a minute", self._path, error)
             self._off_until = t + _RETRY_S
