@@ -17,6 +17,18 @@ def warn(text: str) -> None:
     sys.stderr.write(f"tms: {text}\n")
 
 
+def require_place(path: Path | None, suffix: str = "") -> None:
+    """That a result can be written there: to be found out before the work, not after it. Raises CommandError."""
+    if path is None:
+        return
+    if suffix and path.suffix.lower() != suffix:
+        raise CommandError(f"{path}: the name of a picture ends in {suffix}")
+    if path.is_dir():
+        raise CommandError(f"{path}: that is a folder")
+    if not path.parent.is_dir():
+        raise CommandError(f"{path}: there is no folder {path.parent}")
+
+
 @contextlib.contextmanager
 def result(path: Path) -> Iterator[IO[bytes]]:
     """A file for what a command finds out bit by bit; an older one stays where the work does not come to its end.

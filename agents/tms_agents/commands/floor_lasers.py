@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -65,6 +66,8 @@ def record(arguments: argparse.Namespace) -> int:
     config = read_config(arguments.config, FloorConfig)
     if arguments.out.suffix != ".scans":
         raise CommandError(f"{arguments.out}: the name of a recording ends in .scans")
+    if arguments.seconds is not None and not 0.5 <= arguments.seconds < math.inf:
+        raise CommandError("--seconds is 0.5 or more")
     try:
         writer = ScanWriter(arguments.out)
     except (OSError, ValueError) as error:
@@ -93,8 +96,7 @@ async def _record(config: FloorConfig, arguments: argparse.Namespace, writer: Sc
         shift = clocks.shift_s
         for t, scan in zip(lasers[name].times.of(clocks.now(), mounted), mounted, strict=True):
             writer.add(name, lasers[name].pose, t + shift, scan)
-        if sys.stderr.isatty():
-            sys.stderr.write(f"\r{writer.written} scans ")
+        _show(f"{writer.written} scans")
 
     def changed(name: str, state: DeviceState) -> None:
         _say(f"laser {name}: {state.state}: {state.why}")
@@ -114,7 +116,9 @@ def _scans(arguments: argparse.Namespace, config: FloorConfig, names: list[str],
     async def look() -> list[Recorded]:
         await _require_no_agent(config, "stop it first")
         _say(f"Looking for {seconds:g} s{'; walk through the whole room' if len(names) > 1 else ''} ...")
-        return await gather(config, names, seconds)
+        found = await gather(config, names, seconds, _show)
+        _show("\n")
+        return found
 
     try:
         return asyncio.run(until_signalled(look()))
@@ -136,6 +140,13 @@ def _laser(config: FloorConfig, name: str | None) -> LaserSection:
     if name not in names:
         raise CommandError(f"which laser? one of: {', '.join(names)}")
     return config.lasers[names.index(name)]
+
+
+def _show(text: str) -> None:
+    """How far it is, over what was shown before, where somebody looks."""
+    if sys.stderr.isatty():
+        sys.stderr.write(text if text == "\n" else f"\r{text} ")
+        sys.stderr.flush()
 
 
 def _say(text: str) -> None:

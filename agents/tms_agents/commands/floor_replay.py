@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tms_agents.commands.floor_files import result, warn, write_file
+from tms_agents.commands.floor_files import require_place, result, warn, write_file
 from tms_agents.config import faults_of, read_config
 from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
@@ -26,6 +26,8 @@ from tms_client.cli import CommandError
 
 
 def replay(arguments: argparse.Namespace) -> int:
+    require_place(arguments.out)
+    require_place(arguments.png, ".png")
     config, recordings = recordings_of(arguments)
     tracks = Tracks()
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import math
 import os
 import shutil
 import sys
@@ -13,6 +14,7 @@ from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
 
+from tms_agents.commands.floor_files import require_place
 from tms_agents.commands.floor_replay import recordings_of
 from tms_agents.config import read_config
 from tms_agents.files import write_atomically
@@ -29,9 +31,11 @@ _PNG_S = 1.0
 
 
 def watch(arguments: argparse.Namespace) -> int:
+    for option in ("speed", "wait"):
+        if not 0 <= getattr(arguments, option) < math.inf:
+            raise CommandError(f"--{option} is 0 or more")
+    require_place(arguments.png, ".png")
     if arguments.scans:
-        if arguments.speed < 0:
-            raise CommandError("--speed is 0 or more")
         return _watch_recordings(arguments)
     if arguments.config is None:
         raise CommandError("what shall be watched? --config of an agent, or recordings")

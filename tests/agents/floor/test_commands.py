@@ -8,6 +8,7 @@ import json
 import math
 import os
 import pty
+import re
 import subprocess
 import sys
 
@@ -95,14 +96,26 @@ def test_replay_in_the_frame_of_the_sensor_and_of_several(story_scans, tmp_path)
     ("arguments", "says"),
     [
         (["replay", "none.npz", "--out", "o.json"], "none.npz: No such file"),
-        (["replay", "{story}", "--out", "no/such/folder.json"], "no/such/folder.json: No such file"),
+        (["replay", "{story}", "--out", "no/such/folder.json"], "no/such/folder.json: there is no folder no/such"),
+        (["replay", "none.npz", "--out", "no/such/folder.json"], "there is no folder no/such"),  # before it is read
+        (["replay", "none.npz", "--out", "o.json", "--png", "no/such.png"], "no/such.png: there is no folder no"),
+        (["replay", "none.npz", "--out", "."], ".: that is a folder"),
+        (["replay", "none.npz", "--out", "o.json", "--png", "x.jpg"], "x.jpg: the name of a picture ends in .png"),
+        (["watch", "{story}", "--png", "x.jpg"], "x.jpg: the name of a picture ends in .png"),
+        (["watch", "{story}", "--png", "no/such.png"], "no/such.png: there is no folder no"),
+        (["watch", "{story}", "--once", "--wait", "nan"], "--wait is 0 or more"),
+        (["watch", "{story}", "--speed", "nan"], "--speed is 0 or more"),
+        (["record", "--config", "{config}", "--out", "x.scans", "--seconds", "0"], "--seconds is 0.5 or more"),
+        (["record", "--config", "{config}", "--out", "x.scans", "--seconds", "-1"], "--seconds is 0.5 or more"),
+        (["record", "--config", "{config}", "--out", "x.scans", "--seconds", "nan"], "--seconds is 0.5 or more"),
+        (["replay", "{folder}", "--out", "o.json"], "the folder is no bag"),
         (["replay", "{story}"], "--out"),
         (["replay", "{story}", "--out", "o", "--pose", "1,2"], "--pose '1,2': it is x,y,theta"),
         (["replay", "{story}", "--out", "o", "--pose", "1,nan,2"], "--pose '1,nan,2': it is x,y,theta"),
         (["watch", "{story}", "--pose", "inf,0,0"], "--pose 'inf,0,0': it is x,y,theta"),
         (["replay", "{story}", "--out", "o", "--pose", "1e9,0,0"], "lasers.0.pose.x: Input should be less than"),
         (["replay", "{story}", "--out", "o", "--pose", "1,2,0", "--pose", "1,2,0"], "there are 1 sensors: laser"),
-        (["replay", "{story}", "--out", "o", "--config", "none.toml"], "none.toml: "),
+        (["replay", "{story}", "--out", "o", "--config", "none.toml"], "tms: none.toml: no such file\n"),
         (["watch"], "what shall be watched?"),
         (["watch", "{story}", "--speed", "-1"], "--speed is 0 or more"),
         (["calibrate", "--config", "{config}", "--laser", "x"], "which laser? one of: laser"),
@@ -115,7 +128,7 @@ def test_replay_in_the_frame_of_the_sensor_and_of_several(story_scans, tmp_path)
 )
 def test_bad_input_is_one_line(story_scans, monkeypatch, tmp_path, capsys, arguments, says):
     monkeypatch.chdir(tmp_path)
-    places = {"story": story_scans / "story.scans", "config": story_scans / "floor.toml"}
+    places = {"story": story_scans / "story.scans", "config": story_scans / "floor.toml", "folder": tmp_path}
     assert cli.main(["floor", *(one.format(**places) for one in arguments)]) == 2
     out, err = capsys.readouterr()
     assert says in err and err.startswith("tms: ") and err.count("\n") == 1 and not out
@@ -133,6 +146,24 @@ def test_what_is_beyond_the_reach_that_is_told_is_not_there(story_scans, tmp_pat
         assert cli.main(["floor", "watch", *arguments, "--once", "--wait", "1000"]) == 0
         seen.append((len(json.loads(out.read_text())[-1]["labels"]), " thing " in capsys.readouterr().out))
     assert seen == [(1, True), (0, False)]
+
+
+def test_what_is_left_out_of_a_file_is_one_line(story_scans, tmp_path, capsys):
+    """Times that run backwards, and a damaged byte: the rest is played."""
+    out, damaged, back = tmp_path / "out.json", tmp_path / "damaged.scans", tmp_path / "back.npz"
+    data = bytearray((story_scans / "story.scans").read_bytes())
+    data[len(data) // 3] ^= 1
+    damaged.write_bytes(data)
+    assert cli.main(["floor", "replay", str(damaged), "--out", str(out)]) == 0
+    _, err = capsys.readouterr()
+    assert re.fullmatch(rf"tms: {damaged}: \d+ bytes are damaged and were skipped\n", err)
+    assert len(json.loads(out.read_text())) > 0.8 * (GONE + 4.0) * 10
+    with np.load(story_scans / "story.npz") as story_npz:
+        np.savez(back, **(dict(story_npz) | {"t": story_npz["t"][::-1]}))
+    assert cli.main(["floor", "replay", str(back), "--out", str(out)]) == 0
+    _, err = capsys.readouterr()
+    assert re.fullmatch(rf"tms: {back}: (\d+) of \d+ scans of back are left out: they are not later .*\n", err)
+    assert len(json.loads(out.read_text())) == 1
 
 
 def test_a_pose_may_begin_with_a_minus(story_scans, tmp_path):

@@ -71,3 +71,16 @@ def test_calibrate_is_quiet_when_it_is_broken_off(floor, tmp_path, number):
     arguments = ["calibrate", "--outline", CORNERS, "--seconds", "50"]
     assert floor(*arguments, signalled=number, after="Looking for 50 s") == (130, "", "")
     assert not list(tmp_path.glob("*.calibration.toml*"))
+
+
+def test_a_laser_that_delivers_nothing_leaves_no_file(floor, tmp_path):
+    scans = tmp_path / "room.scans"
+    code, out, err = floor("record", "--out", str(scans), "--seconds", "1", silent=True)
+    assert (code, err) == (1, "") and out.endswith(f"{scans}: 0 scans\n")
+    assert not scans.exists()
+
+
+def test_calibrate_shows_how_far_it_is(floor):
+    code, _, err = floor("calibrate", "--outline", CORNERS, "--seconds", "1", terminal=True)
+    assert code == 0
+    assert err.startswith("\r0 of 1 s, 0 scans ") and "scans \r\n" in err

@@ -28,13 +28,13 @@ from tms_client.cli import CommandError
 _MOST_SCANS = 20_000
 #: Of a long recording so many scans tell where the walls are as well as all do.
 _MOST_STILL = 5000
-_WAIT_S = 20.0
+_WAIT_S, _SHOW_S = 20.0, 0.5
 #: More than this is no fit that an installer wants.
 _LEAST_MATCHED, _MOST_RMSE_M = 0.3, 0.02
 
 
-async def gather(config: FloorConfig, names: Sequence[str], seconds: float) -> list[Recorded]:
-    """What these lasers see for so many seconds, from when all of them deliver.
+async def gather(config: FloorConfig, names: Sequence[str], seconds: float, show: Say) -> list[Recorded]:
+    """What these lasers see for so many seconds, from when all of them deliver; ``show`` is told how far it is.
 
     Raises:
         CommandError: one does not deliver.
@@ -63,7 +63,10 @@ async def gather(config: FloorConfig, names: Sequence[str], seconds: float) -> l
             await asyncio.sleep(0.05)
         for scans in found.values():
             scans.clear()
-        await asyncio.sleep(seconds)
+        begun = clocks.now()
+        while (left := begun + seconds - clocks.now()) > 0:
+            show(f"{seconds - left:.0f} of {seconds:g} s, {sum(map(len, found.values()))} scans")
+            await asyncio.sleep(min(left, _SHOW_S))
     finally:
         for task in tasks:
             task.cancel()
