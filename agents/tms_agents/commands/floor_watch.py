@@ -28,6 +28,8 @@ from tms_agents.running import until_signalled
 from tms_client.cli import CommandError
 
 _PNG_S = 1.0
+#: When, and what is shown.
+_View = tuple[float, dict[str, Any]]
 
 
 def watch(arguments: argparse.Namespace) -> int:
@@ -51,17 +53,14 @@ def watch(arguments: argparse.Namespace) -> int:
 def _watch_recordings(arguments: argparse.Namespace) -> int:
     config, recordings = recordings_of(arguments)
     every_s = 0.1 * max(1.0, arguments.speed) if arguments.speed else 1.0
-    played = watching.play(recordings, config, every_s)
+    played = _played(arguments, watching.play(recordings, config, every_s))
     if arguments.once or (arguments.png is not None and arguments.speed == 0):
         view: dict[str, Any] = {}
         start: float | None = None
-        try:
-            for t, view in played:  # noqa: B007 - the last one
-                start = t if start is None else start
-                if arguments.once and t - start >= arguments.wait:
-                    break
-        except ValueError as error:
-            raise CommandError(f"{', '.join(map(str, arguments.scans))}: {error}") from error
+        for t, view in played:  # noqa: B007 - the last one
+            start = t if start is None else start
+            if arguments.once and t - start >= arguments.wait:
+                break
         _put(view, arguments.png)
         return 0
     with contextlib.suppress(asyncio.CancelledError):
@@ -69,7 +68,15 @@ def _watch_recordings(arguments: argparse.Namespace) -> int:
     return 0
 
 
-async def _paced(played: Iterator[tuple[float, dict[str, Any]]], speed: float) -> AsyncGenerator[dict[str, Any], None]:
+def _played(arguments: argparse.Namespace, views: Iterator[_View]) -> Iterator[_View]:
+    """The same; recordings that no estimator can use are said to be so."""
+    try:
+        yield from views
+    except ValueError as error:
+        raise CommandError(f"{', '.join(map(str, arguments.scans))}: {error}") from error
+
+
+async def _paced(played: Iterator[_View], speed: float) -> AsyncGenerator[dict[str, Any], None]:
     begun, first = time.monotonic(), None
     for t, view in played:
         first = t if first is None else first

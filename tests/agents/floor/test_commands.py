@@ -166,6 +166,16 @@ def test_what_is_left_out_of_a_file_is_one_line(story_scans, tmp_path, capsys):
     assert len(json.loads(out.read_text())) == 1
 
 
+@pytest.mark.parametrize(
+    "how", [["watch"], ["watch", "--once"], ["watch", "--speed", "0"], ["replay", "--out", "o.json"]]
+)
+def test_a_recording_that_no_estimator_can_use_is_one_line(tmp_path, monkeypatch, capsys, how):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "few.csv").write_text("# angle_min = 0\n# angle_increment = 0.1\n1.0,1,1,1\n1.1,1,1,1\n")
+    assert cli.main(["floor", how[0], "few.csv", *how[1:]]) == 2
+    assert capsys.readouterr() == ("", "tms: few.csv: a sensor of the floor needs at least eight beams\n")
+
+
 def test_a_pose_may_begin_with_a_minus(story_scans, tmp_path):
     out, found = tmp_path / "out.json", []
     for pose in (["--pose=-1,2,0"], ["--pose", "-1,2,0"], ["--pose", "-.5,2,0"]):
