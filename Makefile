@@ -26,7 +26,7 @@ help:
 	@echo "make bench-semidynamic-paper  our method beside the paper's (SEMIDYNAMIC='--worlds short')"
 	@echo "make faults    the long fault tests (30 kills and more)"
 	@echo "make peers     tests against programs of other people (installs tshark)"
-	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes"
+	@echo "make fuzz      a million random and mutated inputs to every parser of device bytes, any scans to the floor estimator"
 
 demo: $(READY)
 	$(BIN)/tms demo $(DEMO)
@@ -93,6 +93,7 @@ faults: $(READY)
 
 fuzz: $(READY)
 	$(BIN)/python benchmarks/fuzz_devices.py $(FUZZ)
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/checked TMS_ROOMS=$(or $(ROOMS),300) $(BIN)/python -m pytest -q tests/agents/floor/test_any_scans.py
 
 realdata: $(READY)
 	$(BIN)/python -m pytest -q -m realdata

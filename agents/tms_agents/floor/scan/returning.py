@@ -45,7 +45,7 @@ def whole(
             for i in (beside, beside + side):
                 # The rest of its surface, aslant or not, is still looked past.
                 surface = _gone_near(centre, weight, missing, i, surface)
-                past = past and ranges[i] > surface + _SURFACE_M
+                past = past and 0 <= i < n and ranges[i] > surface + _SURFACE_M
             wider = 0 <= beside < n and states[beside] == foreground and abs(ranges[beside] - r) < _SURFACE_M
             new = new or past or wider
         if new:

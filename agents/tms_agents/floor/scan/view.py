@@ -19,6 +19,9 @@ from tms_agents.floor.state import pack, unpack
 
 Array = NDArray[np.float64]
 
+#: No laser sees so far (m) along a floor: a device that says so means nothing.
+_ENDLESS_M = 500.0
+
 
 @njit(cache=True)
 def _clean(ranges: Array, nearest: float, farthest: float, scale: float, out: Array) -> None:
@@ -124,9 +127,11 @@ class View:
     def reach(self) -> tuple[Array, float, Array, Array]:
         """What `edges.edges_of_sight` needs: how far each beam looks in the empty room, or to a mirror."""
         farthest = np.minimum(self.background.longest, self.rays[:, 8])
-        # Without a reach that is known it is as far as anything that was seen.
-        seen = float(np.max(farthest, initial=0.0, where=np.isfinite(farthest)))
-        far = self._reach_m * self.scale if np.isfinite(self._reach_m) else seen + 1e-3
+        farthest[farthest > _ENDLESS_M] = np.inf
+        far = self._reach_m * self.scale
+        if far > _ENDLESS_M:
+            # It sees as far as anything that was seen.
+            far = float(np.max(farthest, initial=0.0, where=np.isfinite(farthest))) + 1e-3
         return farthest, far, np.asarray(self.sensor.sweep.angles, dtype=float), self.pose
 
     @property
