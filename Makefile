@@ -93,7 +93,7 @@ faults: $(READY)
 
 fuzz: $(READY)
 	$(BIN)/python benchmarks/fuzz_devices.py $(FUZZ)
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/checked TMS_ROOMS=$(or $(ROOMS),300) $(BIN)/python -m pytest -q tests/agents/floor/test_any_scans.py
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/checked TMS_ROOMS=$(or $(ROOMS),300) $(BIN)/python -m pytest -q --timeout 1800 tests/agents/floor/test_any_scans.py
 
 realdata: $(READY)
 	$(BIN)/python -m pytest -q -m realdata
