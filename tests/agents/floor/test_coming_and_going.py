@@ -178,9 +178,10 @@ def test_who_was_last_seen_on_this_side_of_the_threshold_may_turn_round_in_the_d
     one = tracks([DOOR], ROOM)
     walker(one.bodies[0], 4.6, 1.5, (1.0, 0.0), NOW - 0.7)
     told = [(t, event) for t in NOW + np.arange(0.0, 9.0, 0.1) for event in at(one, t)]
-    assert [type(event) for _, event in told] == [Stale, Vanished]
-    assert told[0][0] == NOW
-    assert 5.0 < told[1][0] - NOW < 8.0 and told[1][1].earliest == NOW - 0.7
+    assert [type(event) for _, event in told] == [Moved, Stale, Vanished]
+    assert told[0][0] == told[1][0] == NOW
+    assert told[0][1].xy == pytest.approx((4.6, 1.5), abs=0.11), "where he was seen last"
+    assert 5.0 < told[2][0] - NOW < 8.0 and told[2][1].earliest == NOW - 0.7
 
 
 def test_who_is_hidden_does_not_go_on_through_a_wall() -> None:
@@ -215,7 +216,7 @@ def test_the_name_of_who_walked_is_not_given_to_what_has_no_feet(width: float, h
     one = tracks([DOOR], ROOM)
     walker(one.bodies[0], 3.0, 1.0, (0.0, 0.0), NOW - 2.0)
     one.bodies["stale"][0] = 1
-    assert [type(event) for event in at(one, NOW - 0.1)] == [Stale]
+    one._told.agree([Stale(NOW - 1.0, 1)], one.bodies, NOW - 1.0)
     walker(one.bodies[1], 3.5, 1.0, (0.0, 0.0), NOW)
     new = one.bodies[1]
     new["confirmed"], new["own_stance_n"], new["both"], new["hits"], new["score"] = 0, 0, 0, 20, 20.0

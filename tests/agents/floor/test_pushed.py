@@ -102,6 +102,7 @@ def test_who_goes_on_by_himself_is_believed_then() -> None:
 def test_a_robot_that_was_lost_there_is_found_beside_somebody() -> None:
     one = pushed(0.6, 0.7)
     somebody(one.bodies[2], 4.0, 0.0, label=3, robot=1, stale=1, seen=NOW - 2.0)
+    one._told.agree([Stale(NOW - 1.0, 3)], one.bodies, NOW - 1.0)
     (event,) = goes(one, legs=True)
     assert isinstance(event, Back) and event.label == 3
 

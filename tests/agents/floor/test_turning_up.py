@@ -39,7 +39,7 @@ def tracks() -> Tracks:
     for name, value in (values | {"own": 7.0, "own_n": 200}).items():
         lost[name] = value
     assert tracks.absent.keep(lost)
-    assert look(tracks, NOW - 0.1) == [Stale(NOW - 0.1, 5)]
+    tracks._told.agree([Stale(NOW - 9.0, 5)], tracks.bodies, NOW - 9.0)
     assert [(one.id, one.xy, one.stale) for one in tracks.awaited(NOW)] == [(5, (4.0, 0.0), True)]
     return tracks
 

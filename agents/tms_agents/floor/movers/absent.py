@@ -47,33 +47,33 @@ class Absent:
         #: Whether somebody was waited for in vain.
         self._missed = False
 
-    def keep(self, body: Any) -> bool:
-        """Whether this one, of whom nothing is seen any more, must be somewhere, or may be: then he is waited for."""
+    def keep(self, body: Any) -> Any:
+        """This one, of whom nothing is seen any more, if he must or may be somewhere: he is waited for. Else None."""
         if self.doors.keeps(body):
             return self._wait(self._bodies, body)
-        return not self.doors.told and self.doors.known and self._wait(self._turning, body)
+        return self._wait(self._turning, body) if not self.doors.told and self.doors.known else None
 
-    def turns(self, body: Any) -> bool:
-        """Whether this one, who seems to have gone out by a door, may have turned round in it: then he is waited for.
+    def turns(self, body: Any) -> Any:
+        """This one, who seems to have gone out, if he may have turned round in the door: he is waited for. Else None.
 
         Whoever goes out is seen last on the threshold.
         """
         if not self.doors.told:
-            return False
+            return None
         foot = "a" if body["a_seen"] > body["b_seen"] else "b"
         x, y = float(body[f"{foot}x"]), float(body[f"{foot}y"])
-        if self._region.depth(x, y) < _THRESHOLD_M or not self._wait(self._turning, body):
-            return False
-        self._turning[-1]["x"], self._turning[-1]["y"] = x, y
-        return True
+        kept = self._wait(self._turning, body) if self._region.depth(x, y) >= _THRESHOLD_M else None
+        if kept is not None:
+            kept["x"], kept["y"] = x, y
+        return kept
 
     @staticmethod
-    def _wait(lost: list[Any], body: Any) -> bool:
-        somebody = body["hits"] >= _SOMEBODY and not body["robot"] and body["wide"] < 0.3
-        if somebody:
-            lost.append(body.copy())
-            lost[-1]["stale"] = CONCEALED
-        return bool(somebody)
+    def _wait(lost: list[Any], body: Any) -> Any:
+        if body["hits"] < _SOMEBODY or body["robot"] or body["wide"] >= 0.3:
+            return None
+        lost.append(body.copy())
+        lost[-1]["stale"] = CONCEALED
+        return lost[-1]
 
     @property
     def bodies(self) -> list[Any]:

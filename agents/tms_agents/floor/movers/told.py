@@ -2,89 +2,114 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numba import njit
 
-from tms_agents.floor.events import Back, FloorEvent, Moved, Stale, Vanished
+from tms_agents.floor.events import Appeared, Back, FloorEvent, Moved, Stale, Vanished
 from tms_agents.floor.feet.place import place
+from tms_agents.floor.norm import norm
 
-Point = tuple[float, float]
-
-#: A mover as it is now: its label, place (x, y m, variance m²), whether it is seen and whether it is stale.
-_THERE = np.dtype([("label", "i8"), ("x", "f8"), ("y", "f8"), ("variance", "f8"), ("seen", "?"), ("stale", "?")])
-#: Nobody is told to be farther (m) from where his label is.
+#: What was told of a mover: where it is (x, y m), and whether it is stale.
+_KNOWN = np.dtype([("label", "i8"), ("x", "f8"), ("y", "f8"), ("stale", "?")])
+#: A mover as it is (x, y m, variance m²), where that is not what was told: what is to be told.
+_NEWS = np.dtype([("label", "i8"), ("x", "f8"), ("y", "f8"), ("variance", "f8"), ("what", "i8")])
+_MOVED, _BACK, _STALE = 1, 2, 4
+#: Nobody who is seen, or stale, is told to be farther (m) from where the label is.
 _FAR_M = 0.1
 
 
 class Told:
-    """Where each mover was told to be (x, y m), by label, and which were told to be stale."""
+    """What was told of each mover; so many bodies at ``most``."""
 
     def __init__(self, most: int) -> None:
-        self._places: dict[int, Point] = {}
-        self._stale: set[int] = set()
-        self._there = np.zeros(most, _THERE)
+        #: By label the row of what is known; rows of label 0 are free.
+        self._rows: dict[int, int] = {}
+        self._known, self._news = np.zeros(2 * most, _KNOWN), np.zeros(most, _NEWS)
 
-    def agree(self, events: Iterable[FloorEvent], bodies: Any, awaited: Iterable[Any], t: float) -> list[FloorEvent]:
+    def agree(self, events: Iterable[FloorEvent], bodies: Any, t: float) -> list[FloorEvent]:
         """The ``events`` of the scan at t, without what is known, and with what ``bodies`` (n,) tell besides.
 
         In the hypothesis that is the best now somebody may be hidden who was not in the one before, or be seen again,
-        or have somebody else's name. Who is ``awaited`` is stale.
+        or have somebody else's name.
         """
         told = [one for event in events if (one := self._new(event)) is not None]
-        there = self._there[: _movers(bodies, t, self._there)].tolist()
-        there += [(int(body["label"]), *place(body, t), False, True) for body in awaited]
-        for label, x, y, variance, seen, stale in there:
-            back = not stale and label in self._stale
-            # Where somebody goes whom nobody sees is a guess.
-            far = (seen or stale) and math.dist((x, y), self._places.get(label, (x, y))) > _FAR_M
-            if back or far:
-                event = (Back if back else Moved)(t, label, (x, y), (variance, 0.0, variance))
-                told.append(event)
-                self._new(event)
-        hidden = {label for label, *_, stale in there if stale}
-        told += [Stale(t, label) for label in sorted(hidden - self._stale)]
-        self._stale = hidden
+        for label, x, y, variance, what in self._news[: _news(bodies, t, self._known, self._news)].tolist():
+            more: list[FloorEvent] = []
+            if what & (_MOVED | _BACK):
+                more.append((Back if what & _BACK else Moved)(t, label, (x, y), (variance, 0.0, variance)))
+            if what & _STALE:
+                more.append(Stale(t, label))
+            told += [one for event in more if (one := self._new(event)) is not None]
         return told
 
-    def save(self) -> dict[str, Any]:
+    def save(self) -> list[list[Any]]:
         """JSON values."""
-        return {"places": [[label, *xy] for label, xy in self._places.items()], "stale": sorted(self._stale)}
+        return [list(self._known[row].tolist()) for row in self._rows.values()]
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
-        self._places = {int(label): (float(x), float(y)) for label, x, y in saved["places"]}
-        self._stale = {int(label) for label in saved["stale"]}
+        self._rows.clear()
+        self._known["label"] = 0
+        for label, x, y, stale in saved:
+            row = self._row(int(label))
+            self._known[row] = int(label), float(x), float(y), bool(stale)
 
     def _new(self, event: FloorEvent) -> FloorEvent | None:
         """The event, if it is news: what is told is known from now on."""
-        if isinstance(event, Stale):
-            known = event.label in self._stale
-            self._stale.add(event.label)
-            return None if known else event
         if isinstance(event, Vanished):
-            self._places.pop(event.label, None)
-            self._stale.discard(event.label)
+            if (gone := self._rows.pop(event.label, None)) is not None:
+                self._known["label"][gone] = 0
             return event
-        self._places[event.label] = event.xy
-        if isinstance(event, Back) and event.label not in self._stale:
+        row = self._row(event.label)
+        known = self._known[row]
+        was_stale = bool(known["stale"])
+        if isinstance(event, Stale):
+            known["stale"] = True
+            return None if was_stale else event
+        known["x"], known["y"] = event.xy
+        if isinstance(event, Appeared | Back):
+            known["stale"] = False
+        if isinstance(event, Back) and not was_stale:
             return Moved(event.t, event.label, event.xy, event.cov)
-        if isinstance(event, Back):
-            self._stale.remove(event.label)
         return event
+
+    def _row(self, label: int) -> int:
+        """Where what is known of the label is."""
+        if (row := self._rows.get(label)) is None:
+            if len(self._rows) == self._known.size:
+                self._known = np.concatenate([self._known, np.zeros_like(self._known)])
+            row = self._rows[label] = int((self._known["label"] == 0).argmax())
+            self._known[row] = label, np.nan, np.nan, False
+        return row
 
 
 @njit(cache=True)
-def _movers(bodies: Any, t: float, there: Any) -> int:
-    """Fill ``there`` (n,) with the movers among ``bodies`` (n,) at t: how many there are."""
+def _news(bodies: Any, t: float, known: Any, news: Any) -> int:
+    """Fill ``news`` (n,) with the movers among ``bodies`` (n,) of whom other things are ``known`` (k,): how many."""
     count = 0
     for b in range(bodies.size):
-        body, one = bodies[b], there[count]
-        if body.used and body.confirmed:
-            one.label, one.seen, one.stale = body.label, body.seen == t, body.stale != 0
-            one.x, one.y, one.variance = place(body, t)
-            count += 1
+        body = bodies[b]
+        if not body.used or not body.confirmed:
+            continue
+        for k in range(known.size):
+            one = known[k]
+            if one.label != body.label:
+                continue
+            x, y, variance = place(body, t)
+            what = 0
+            if one.stale and not body.stale:
+                what = _BACK
+            elif (body.stale or body.seen == t) and norm(x - one.x, y - one.y) > _FAR_M:
+                # Where somebody goes whom nobody sees is a guess.
+                what = _MOVED
+            if body.stale and not one.stale:
+                what += _STALE
+            if what:
+                new = news[count]
+                new.label, new.x, new.y, new.variance, new.what = body.label, x, y, variance, what
+                count += 1
+            break
     return count

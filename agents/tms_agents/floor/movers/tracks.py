@@ -126,10 +126,10 @@ class Tracks:
         self._believe_steps(t)
         self._association.rename(t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t) + self._gone_out(t)
-        for index, body in enumerate(self.bodies):
-            action = int(self._actions[index])
+        for index in np.flatnonzero(self._actions).tolist():
+            body, action = self.bodies[index], int(self._actions[index])
             if action == NOTHING or not body["used"]:
-                # Or it is somebody else's body by now.
+                # It has gone meanwhile, or is somebody else's.
                 continue
             if action == FLICKERS:
                 self.flickering.found(body, t)
@@ -154,7 +154,7 @@ class Tracks:
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             elif action in (MOVED, BROAD):
                 events.append(Moved(t, *self._tell(index, t)))
-        return self._told.agree(events, self.bodies, self.absent.bodies, t)
+        return self._told.agree(events, self.bodies, t)
 
     def labels(self, t: float) -> list[FloorLabel]:
         """The movers there are, but for those who are ``awaited``."""
@@ -173,7 +173,7 @@ class Tracks:
         self.absent.found(old)
         self.bodies[index]["confirmed"] = 1
         self._go_on(index, old)
-        return self._told.agree([Back(t, *self._tell(index, t))], self.bodies, self.absent.bodies, t)
+        return self._told.agree([Back(t, *self._tell(index, t))], self.bodies, t)
 
     def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
         """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
@@ -199,9 +199,8 @@ class Tracks:
             body["clear"] = 0.0
             return self._lost(index, t)
         self._association.forget(index)
-        if (body["clear"] > self._settings.leave_s and self.absent.keep(body)) or self.absent.turns(body):
-            return [] if body["stale"] else [Stale(t, int(body["label"]))]
-        return [Vanished(t, int(body["label"]), float(body["seen"]), t)]
+        kept = self.absent.keep(body) if body["clear"] > self._settings.leave_s else None
+        return self._waits_or_gone(body, self.absent.turns(body) if kept is None else kept, t)
 
     def _see_off(self, t: float) -> None:
         """Who has gone on out of the room while nobody saw him has left."""
@@ -228,11 +227,17 @@ class Tracks:
         while (index := doubled(self.bodies)) >= 0:
             body = self.bodies[index]
             self._association.forget(index)
-            if not self.absent.keep(body):
-                events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
-            elif not body["stale"]:
-                events.append(Stale(t, int(body["label"])))
+            events += self._waits_or_gone(body, self.absent.keep(body), t)
         return events
+
+    @staticmethod
+    def _waits_or_gone(body: Any, kept: Any, t: float) -> list[FloorEvent]:
+        """The body has left, or is ``kept`` to be waited for where he was seen last."""
+        label = int(body["label"])
+        if kept is None:
+            return [Vanished(t, label, float(body["seen"]), t)]
+        x, y, variance = place(kept, t)
+        return [Moved(t, label, (x, y), (variance, 0.0, variance)), Stale(t, label)]
 
     def _lost(self, index: int, t: float, *, thing: bool = False) -> list[FloorEvent]:
         """The mover is not there; what is seen of it now, if anything, is somebody else's foot, or a ``thing``."""
@@ -249,8 +254,7 @@ class Tracks:
                 body["x"], body["y"] = self._where.seats.into(float(body["x"]), float(body["y"]), _DEEP_M)
         elif body["seen"] - body["rest_at"] < _RESTS_S and self._where.leaves(body):
             self._association.forget(index)
-            left = not self.absent.turns(body)
-            return [Vanished(t, int(body["label"]), float(body["seen"]), t) if left else Stale(t, int(body["label"]))]
+            return self._waits_or_gone(body, self.absent.turns(body), t)
         if body["seen"] == t:
             # What is seen is something else.
             self._association.decide(index)

@@ -75,7 +75,7 @@ def test_who_turns_round_in_the_door_keeps_his_name(
 ) -> None:
     one = person(-0.4, 0.0, label=3)
     one["ax"], one["ay"], one["a_seen"], one["b_seen"] = inside_m, 0.0, 10.0, 9.0
-    assert absent.turns(one) == (inside_m > 0.25)
+    assert (absent.turns(one) is not None) == (inside_m > 0.25)
     found = absent.find(person(0.6, 0.2, first=turned, own=own), expected())
     assert (found is not None and found["label"] == 3) == same
 

@@ -29,7 +29,7 @@ def known() -> tuple[Told, np.ndarray]:
     """Two movers that have been told at (0, 0)."""
     told = Told(4)
     met: list[FloorEvent] = [Appeared(0.0, label, "mover", (0.0, 0.0), COV) for label in (1, 2)]
-    assert told.agree(met, people(), [], 0.0) == met
+    assert told.agree(met, people(), 0.0) == met
     return told, people()
 
 
@@ -43,7 +43,7 @@ def test_whoever_hears_the_events_knows_where_movers_are(scans: list) -> None:
         for b, (x, hidden) in enumerate(movers):
             bodies["x"][b], bodies["stale"][b] = x, hidden
         bodies["label"][:2] = (2, 1) if exchanged else (1, 2)
-        for event in told.agree([], bodies, [], t):
+        for event in told.agree([], bodies, t):
             if isinstance(event, Stale):
                 assert event.label not in stale
                 stale.add(event.label)
@@ -66,27 +66,28 @@ def test_what_is_known_is_not_told_again(hidden: bool) -> None:
     told, bodies = known()
     bodies["stale"][0] = hidden
     events: list[FloorEvent] = [Stale(1.0, 1)] if hidden else [Moved(1.0, 1, (0.0, 0.0), COV)]
-    assert told.agree(events, bodies, [], 1.0) == events
+    assert told.agree(events, bodies, 1.0) == events
     again: list[FloorEvent] = [Stale(2.0, 1)] if hidden else []
-    assert told.agree(again, bodies, [], 2.0) == []
-    (event,) = told.agree([Back(3.0, 2, (0.0, 0.0), COV)], bodies, [], 3.0)
+    assert told.agree(again, bodies, 2.0) == []
+    (event,) = told.agree([Back(3.0, 2, (0.0, 0.0), COV)], bodies, 3.0)
     assert isinstance(event, Moved), "nobody has missed him"
 
 
-def test_who_is_awaited_is_stale_until_he_has_left() -> None:
+def test_there_is_room_for_all_who_are_waited_for() -> None:
     told, bodies = known()
-    gone = bodies[:1].copy()
-    bodies["used"][0] = 0
-    assert told.agree([], bodies, gone, 1.0) == [Stale(1.0, 1)]
-    assert told.agree([], bodies, gone, 2.0) == []
-    left = Vanished(3.0, 1, 0.0, 3.0)
-    assert told.agree([left], bodies, [], 3.0) == [left]
+    for label in range(3, 60):
+        told.agree([Appeared(0.0, label, "mover", (1.0, 1.0), COV), Stale(0.0, label)], bodies, 0.0)
+    for label in range(3, 60):
+        back: FloorEvent = Back(1.0, label, (2.0, 1.0), COV)
+        assert told.agree([back, back], bodies, 1.0) == [back, Moved(1.0, label, (2.0, 1.0), COV)]
+        left = Vanished(2.0, label, 0.0, 2.0)
+        assert told.agree([left], bodies, 2.0) == [left]
 
 
 def test_it_goes_on_after_a_restart() -> None:
     told, bodies = known()
     bodies["stale"][0] = 1
-    told.agree([], bodies, [], 1.0)
+    told.agree([], bodies, 1.0)
     again = Told(4)
     again.restore(told.save())
-    assert again.agree([], bodies, [], 2.0) == []
+    assert again.agree([], bodies, 2.0) == []
