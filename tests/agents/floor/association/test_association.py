@@ -34,6 +34,28 @@ def _told(scene: str, feet: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize("feet", ["prints", "legs"])
+def test_no_hypothesis_has_anybody_stand_on_a_print_that_is_no_more(feet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another one would begin in its place, maybe metres away, and count as the foot that has stayed."""
+    looked, plain = [0], Association.step
+
+    def step(self: Association, scan: ClusteredScan, sight: Any) -> Any:
+        taken = plain(self, scan, sight)
+        for one in self.hypotheses:
+            for foot in ("a", "b"):
+                stands = one[(one["used"] == 1) & (one[f"{foot}_print"] >= 0)]
+                prints = scan.prints[stands[f"{foot}_print"]]
+                assert prints["used"].all()
+                away = np.hypot(stands[f"{foot}x"] - prints["x"], stands[f"{foot}y"] - prints["y"])
+                assert (away < 0.5).all()
+                looked[0] += len(stands)
+        return taken
+
+    monkeypatch.setattr(Association, "step", step)
+    _told("eight", feet)
+    assert looked[0] > 500
+
+
+@pytest.mark.parametrize("feet", ["prints", "legs"])
 def test_whose_foot_it_is_has_nothing_to_do_with_the_rest(feet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bodies that differ in these fields alone are the same to `likelihood.feet`."""
     rng = np.random.default_rng(0)
