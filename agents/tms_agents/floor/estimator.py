@@ -120,7 +120,7 @@ class FloorEstimator:
         return sorted(self._tracks.labels(self._t) + self._objects.labels(), key=lambda label: label.id)
 
     def awaited(self) -> list[FloorLabel]:
-        """Movers who must be in the room and may be anywhere in it, at the place where each was seen last."""
+        """Movers who must be in the room and may be anywhere in it, about where each was seen last."""
         return self._tracks.awaited(self._t)
 
     def poses(self) -> dict[str, Pose]:

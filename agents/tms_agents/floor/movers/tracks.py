@@ -161,7 +161,7 @@ class Tracks:
         return [_label(body, t) for body in self.bodies if body["used"] and body["confirmed"]]
 
     def awaited(self, t: float) -> list[FloorLabel]:
-        """Movers of whom nothing is seen and who have not left: where they were seen last."""
+        """Movers of whom nothing is seen and who have not left: about where they were seen last."""
         return [_label(body, t) for body in self.absent.bodies]
 
     def turns_up(self, prints: Any, i: int, t: float) -> list[FloorEvent]:
@@ -232,7 +232,7 @@ class Tracks:
 
     @staticmethod
     def _waits_or_gone(body: Any, kept: Any, t: float) -> list[FloorEvent]:
-        """The body has left, or is ``kept`` to be waited for where he was seen last."""
+        """The body has left, or is ``kept`` to be waited for, about where it was seen last."""
         label = int(body["label"])
         if kept is None:
             return [Vanished(t, label, float(body["seen"]), t)]
