@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,30 @@ class Sweep:
     range_min_m: float
     range_max_m: float
     model: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values, exactly."""
+        return {
+            "angles": self.angles.tolist(),
+            "time_increment_s": self.time_increment_s,
+            "period_s": self.period_s,
+            "range_min_m": self.range_min_m,
+            "range_max_m": self.range_max_m if np.isfinite(self.range_max_m) else None,
+            "model": self.model,
+        }
+
+    @classmethod
+    def from_json(cls, told: Mapping[str, Any]) -> Self:
+        """What `to_json` gave, whatever else is told. Raises KeyError, TypeError or ValueError where it is not that."""
+        far = told["range_max_m"]
+        return cls(
+            np.array(told["angles"], dtype=np.float64),
+            told["time_increment_s"],
+            told["period_s"],
+            told["range_min_m"],
+            np.inf if far is None else far,
+            told["model"],
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -111,7 +111,7 @@ class Floor:
             return {"t": self._clocks.now()}
         return {
             "t": self._clocks.now(),
-            "sweeps": {name: _sweep_to_dict(sensor.sweep) for name, sensor in self._sensors.items()},
+            "sweeps": {name: sensor.sweep.to_json() for name, sensor in self._sensors.items()},
             "poses": {name: list(sensor.pose) for name, sensor in self._sensors.items()},
             "labels": self.labels.to_dict(),
             "estimator": self.estimator.to_dict(),
@@ -173,7 +173,7 @@ class Floor:
         if "estimator" not in saved:
             return
         try:
-            sweeps = {name: _sweep_of(one) for name, one in saved["sweeps"].items()}
+            sweeps = {name: Sweep.from_json(one) for name, one in saved["sweeps"].items()}
             if set(sweeps) != set(self.lasers):
                 raise ValueError("it is of other lasers")
             for name, pose in saved["poses"].items():
@@ -188,19 +188,3 @@ class Floor:
             log.warning("the saved state of the floor does not fit, starting anew: %s", error)
             return
         self._sensors, self.estimator = sensors, estimator
-
-
-def _sweep_to_dict(sweep: Sweep) -> dict[str, Any]:
-    return {
-        "angles": sweep.angles.tolist(),
-        "time_increment_s": sweep.time_increment_s,
-        "period_s": sweep.period_s,
-        "range_min_m": sweep.range_min_m,
-        "range_max_m": sweep.range_max_m if np.isfinite(sweep.range_max_m) else None,
-        "model": sweep.model,
-    }
-
-
-def _sweep_of(saved: Mapping[str, Any]) -> Sweep:
-    far = np.inf if saved["range_max_m"] is None else saved["range_max_m"]
-    return Sweep(**{**saved, "angles": np.array(saved["angles"], dtype=np.float64), "range_max_m": far})

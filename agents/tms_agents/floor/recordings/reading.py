@@ -8,7 +8,7 @@ import weakref
 import zlib
 from bisect import bisect_right
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,18 +29,26 @@ def read_recording(path: Path, damage: Damage) -> list[Recorded]:
     source = _Source(path)
     sensors: dict[str, _Blocks] = {}
     by_number: dict[int, _Blocks] = {}
+    # Of lasers whose description is damaged, until another one tells the same.
+    undescribed: dict[int, list[_Block]] = {}
+    scans = 0
     with open(source.number, "rb", closefd=False) as file:
         for record in records(file, damage):
             if record.kind == b"S":
                 told = json.loads(zlib.decompress(record.body))
                 number = told.pop("sensor")
-                by_number[number] = sensors.setdefault(json.dumps(told), _Blocks(source, told))
+                described = by_number[number] = sensors.setdefault(json.dumps(told), _Blocks(source, told))
+                for block in undescribed.pop(number, ()):
+                    described.add(block)
                 continue
-            number, scans, beams, _ = BLOCK.unpack_from(record.body)
-            if number in by_number and by_number[number].beams == beams:
-                by_number[number].add(record.at, record.body)
+            number, _, beams, _ = BLOCK.unpack_from(record.body)
+            block = _Block(record.at, len(record.body), zlib.crc32(record.body), beams, times(record.body))
+            if number in by_number:
+                by_number[number].add(block)
             else:
-                damage.undescribed += scans
+                undescribed.setdefault(number, []).append(block)
+            scans += len(block.times)
+    damage.undescribed = scans - sum(map(len, sensors.values()))
     return [one.recorded() for one in sensors.values() if len(one)]
 
 
@@ -59,29 +67,36 @@ class _Source:
             raise CommandError(f"{self.path}: {error.strerror}") from error
 
 
+class _Block(NamedTuple):
+    """Where a block is, how long it is, its check sum, how many beams its scans have, and their times (T,) s."""
+
+    at: int
+    length: int
+    check: int
+    beams: int
+    times: Array
+
+
 class _Blocks:
     """The scans of one sensor; of its blocks the one looked at last is kept decoded."""
 
     def __init__(self, source: _Source, told: dict[str, Any]) -> None:
         self._source, self._told = source, told
-        self.beams = len(told["angles"])
-        #: Where each block is, how long it is, and its check sum.
-        self._places: list[tuple[int, int, int]] = []
+        self._blocks: list[_Block] = []
         #: The number of the first scan of each block, and of the one after the last.
         self._firsts = [0]
-        self._times: list[Array] = []
         self._decoded: tuple[int, Array, Array | None] | None = None
 
-    def add(self, at: int, body: bytes) -> None:
-        self._times.append(times(body))
-        self._places.append((at, len(body), zlib.crc32(body)))
-        self._firsts.append(self._firsts[-1] + len(self._times[-1]))
+    def add(self, block: _Block) -> None:
+        """One more, unless it is of another sweep."""
+        if block.beams == len(self._told["angles"]):
+            self._blocks.append(block)
+            self._firsts.append(self._firsts[-1] + len(block.times))
 
     def recorded(self) -> Recorded:
         x, y, theta = self._told["pose"]
-        t = np.concatenate(self._times)
-        self._times.clear()
-        return Recorded(self._told["name"], _sweep(self._told), (x, y, theta), t, self)
+        t = np.concatenate([block.times for block in self._blocks])
+        return Recorded(self._told["name"], Sweep.from_json(self._told), (x, y, theta), t, self)
 
     def __len__(self) -> int:
         return self._firsts[-1]
@@ -97,20 +112,8 @@ class _Blocks:
         return ranges[row], None if bright is None else bright[row]
 
     def _unpacked(self, block: int) -> tuple[Array, Array | None]:
-        at, length, check = self._places[block]
-        body = self._source.read(at, length)
-        if zlib.crc32(body) != check:
+        here = self._blocks[block]
+        body = self._source.read(here.at, here.length)
+        if zlib.crc32(body) != here.check:
             raise CommandError(f"{self._source.path}: it changed while it was read")
         return unpacked(body, self._told["unit_m"])
-
-
-def _sweep(told: dict[str, Any]) -> Sweep:
-    far = told["range_max_m"]
-    return Sweep(
-        np.array(told["angles"], dtype=np.float64),
-        told["time_increment_s"],
-        told["period_s"],
-        told["range_min_m"],
-        np.inf if far is None else far,
-        told["model"],
-    )

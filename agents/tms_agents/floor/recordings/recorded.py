@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tms_agents.devices.scans import Array, Scan, Sweep
+from tms_agents.floor.settings import Pose
 
-Pose = tuple[float, float, float]
 #: Of one scan: ranges (B,) m as in ``Scan``, intensities (B,) where it has them.
 Row = tuple[Array, Array | None]
 

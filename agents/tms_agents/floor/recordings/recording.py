@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -18,13 +19,27 @@ import numpy as np
 
 from tms_agents.devices.scans import Scan, Sweep
 from tms_agents.floor.recordings.blocks import MOST_UNITS, packed
-from tms_agents.floor.recordings.recorded import Pose
 from tms_agents.floor.recordings.records import BLOCK, HEAD, MAGIC, Damage, records
+from tms_agents.floor.settings import Pose
 
 #: Of what is written between two times that the disk was told to be sure, so much may be torn by a power cut.
 _TORN = 1 << 22
 #: A block is written after so many seconds of scans or so many scans.
 BLOCK_S, BLOCK_SCANS = 1.0, 100
+#: A laser is described again after so long (s): if one description is damaged another one tells the same.
+_AGAIN_S = 600.0
+
+
+@dataclass(slots=True)
+class _Described:
+    """How a laser sweeps and where it stands, its number, what its ranges count in (m), the record, and when (s)."""
+
+    sweep: Sweep
+    pose: Pose
+    number: int
+    unit: float
+    told: bytes
+    at: float
 
 
 class ScanWriter:
@@ -49,17 +64,20 @@ class ScanWriter:
         except BaseException:
             self._file.close()
             raise
-        self._numbers: dict[str, tuple[Sweep, Pose, int, float]] = {}
+        self._described: dict[str, _Described] = {}
         self._waiting: dict[str, list[tuple[float, Scan]]] = {}
         #: Scans taken so far, and those of them that are in the file.
         self.written = self.kept = 0
 
     def add(self, sensor: str, pose: Pose, t: float, scan: Scan) -> None:
         """A scan with the time of its first beam; written with others after about a second."""
-        known = self._numbers.get(sensor)
-        if known is None or known[0] is not scan.sweep or known[1] != pose:
+        known = self._described.get(sensor)
+        if known is None or known.sweep is not scan.sweep or known.pose != pose:
             self._write(sensor)
-            self._describe(sensor, pose, scan.sweep)
+            self._describe(sensor, pose, t, scan.sweep)
+        elif not 0.0 <= t - known.at <= _AGAIN_S:
+            known.at = t
+            self._record(b"S", known.told)
         if (before := self._waiting.get(sensor)) and _has(before[-1][1]) != _has(scan):
             self._write(sensor)  # the scans of a block are alike
         waiting = self._waiting.setdefault(sensor, [])
@@ -85,31 +103,22 @@ class ScanWriter:
                 if self.size == 0:
                     self.path.unlink(missing_ok=True)
 
-    def _describe(self, sensor: str, pose: Pose, sweep: Sweep) -> None:
+    def _describe(self, sensor: str, pose: Pose, t: float, sweep: Sweep) -> None:
         # Whole millimetres, as devices have them, unless the reach needs more room.
         reach = sweep.range_max_m if np.isfinite(sweep.range_max_m) else 65.0
         unit = 0.001 * max(1, int(np.ceil(reach * 1000 / MOST_UNITS)))
         number, self._next = self._next, self._next + 1
-        self._numbers[sensor] = (sweep, pose, number, unit)
-        told = {
-            "sensor": number,
-            "name": sensor,
-            "pose": list(pose),
-            "unit_m": unit,
-            "angles": [round(float(one), 9) for one in sweep.angles],
-            "time_increment_s": sweep.time_increment_s,
-            "period_s": sweep.period_s,
-            "range_min_m": sweep.range_min_m,
-            "range_max_m": sweep.range_max_m if np.isfinite(sweep.range_max_m) else None,
-            "model": sweep.model,
-        }
-        self._record(b"S", zlib.compress(json.dumps(told).encode()))
+        told = {"sensor": number, "name": sensor, "pose": list(pose), "unit_m": unit, **sweep.to_json()}
+        told["angles"] = [round(angle, 9) for angle in told["angles"]]
+        known = _Described(sweep, pose, number, unit, zlib.compress(json.dumps(told).encode()), t)
+        self._described[sensor] = known
+        self._record(b"S", known.told)
 
     def _write(self, sensor: str) -> None:
         if scans := self._waiting.get(sensor):
-            _, _, number, unit = self._numbers[sensor]
+            known = self._described[sensor]
             self._waiting[sensor] = []
-            self._record(b"B", packed(number, unit, scans))
+            self._record(b"B", packed(known.number, known.unit, scans))
             self.kept += len(scans)
 
     def _record(self, kind: bytes, body: bytes) -> None:

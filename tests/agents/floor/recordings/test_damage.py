@@ -67,15 +67,9 @@ def spans(data):
 
 def expected(data, first, last):
     """The times of all scans whose block and description have no byte within [first, last)."""
-    described, found = set(), []
-    for start, end, kind, sensor, times in spans(data):
-        if first < end and last > start:
-            continue
-        if kind == b"S":
-            described.add(sensor)
-        elif sensor in described:
-            found += times
-    return sorted(found)
+    whole = [one for one in spans(data) if not (first < one[1] and last > one[0])]
+    described = {sensor for _, _, kind, sensor, _ in whole if kind == b"S"}
+    return sorted(t for _, _, kind, sensor, times in whole if kind == b"B" and sensor in described for t in times)
 
 
 def times_of(recordings):
@@ -155,6 +149,21 @@ def test_a_laser_whose_description_is_damaged_is_lost_until_it_is_described_agai
     ]
     write(path, [40.0], names=("b",))  # no number of before is given again
     assert sorted(len(one) for one in read_scans(path, said.append)) == [1, 80, 120]
+
+
+def test_a_laser_is_described_again_so_that_one_damaged_description_costs_nothing(tmp_path):
+    path, said = tmp_path / "x.scans", []
+    write(path, np.arange(0.0, 700.0, 0.5), names=("b",))
+    data = bytearray(path.read_bytes())
+    descriptions = [start for start, _, kind, *_ in spans(data) if kind == b"S"]
+    assert len(descriptions) == 2
+    for at in descriptions:
+        damaged = bytearray(data)
+        damaged[at + 20] ^= 1
+        path.write_bytes(damaged)
+        (one,) = read_scans(path, said.append)
+        assert np.array_equal(one.t, np.arange(0.0, 700.0, 0.5))
+        assert "lost" not in said[-1]
 
 
 def test_a_large_end_that_cannot_be_read_is_kept(tmp_path, whole):
