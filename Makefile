@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor bench-feet bench-whose bench-places floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor bench-feet bench-whose bench-names bench-places floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -16,6 +16,7 @@ help:
 	@echo "make bench-floor    floor sensing on simulated rooms (FLOOR='--quick' for a few minutes)"
 	@echo "make bench-feet     whose foot has landed, decision by decision (FEET='--fit' fits the numbers behind it)"
 	@echo "make bench-whose    how likely the costs of feet make what is right (WHOSE='--fit' fits them again)"
+	@echo "make bench-names    how likely people who met are told to have been exchanged, and how often they were"
 	@echo "make bench-places   where people in shoes are told to be, and the fit of the numbers behind it"
 	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
 	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
@@ -62,6 +63,9 @@ bench-feet: $(READY)
 
 bench-whose: $(READY)
 	$(BIN)/python benchmarks/floor_whose.py $(WHOSE)
+
+bench-names: $(READY)
+	$(BIN)/python benchmarks/floor_names.py $(NAMES)
 
 bench-places: $(READY)
 	$(BIN)/python benchmarks/floor_places.py

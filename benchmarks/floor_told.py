@@ -108,8 +108,9 @@ class Told(Association):
         scatter(self.bodies, scan.clusters, scan.of, scan.marks, scan.t, self.scattered)
         return ~free
 
-    def rename(self, t: float) -> None:
+    def rename(self, t: float) -> list[tuple[int, int]]:
         """Names are right."""
+        return []
 
     def _follow(self, rows: Any) -> None:
         """Whose each of the bodies ``rows`` is: a new one is whose it is near, if he has none."""

@@ -2,12 +2,13 @@
 
 import tms_agents.compiled  # noqa: F401, before there are kernels
 from tms_agents.floor.estimator import FloorEstimator
-from tms_agents.floor.events import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.events import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.settings import FloorSettings, Scene, Sensor
 
 __all__ = [
     "Appeared",
     "Back",
+    "Confused",
     "FloorEstimator",
     "FloorEvent",
     "FloorLabel",

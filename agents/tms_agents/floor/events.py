@@ -85,4 +85,19 @@ class Back:
     cov: Covariance
 
 
-FloorEvent = Appeared | Moved | Vanished | Stale | Back
+@dataclass(frozen=True, slots=True)
+class Confused:
+    """Two movers who met were taken for each other with probability ``p``: since then each has what the other had.
+
+    They were nearest ``since``; what was told before of where each is stands. 1: from now on their labels are
+    exchanged, to give back to each his own.
+    """
+
+    t: float
+    label: int
+    other: int
+    p: float
+    since: float
+
+
+FloorEvent = Appeared | Moved | Vanished | Stale | Back | Confused

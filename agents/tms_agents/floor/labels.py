@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from tms_agents.floor import Appeared, Back, FloorEvent, FloorLabel, Moved, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Vanished
 from tms_schemas.events import Near
 from tms_schemas.observation import (
     InventoryLabel,
@@ -18,6 +18,7 @@ from tms_schemas.observation import (
     LabelVanished,
     MoverEntered,
     MoverLeft,
+    MoverSwap,
     Observation,
     Transfer,
 )
@@ -156,6 +157,8 @@ class Labels:
             yield from self._left(event, shift) if event.label in self.movers else self._taken(event, shift)
         elif isinstance(event, Moved | Back) and (mover := self.movers.get(event.label)) is not None:
             yield from self._walks(mover, event, shift)
+        elif isinstance(event, Confused):
+            yield from self._swapped(event, shift)
 
     def _entered(self, event: Appeared, shift: float) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))
@@ -197,6 +200,15 @@ class Labels:
             yield Transfer(seq=0, observed_at=at, from_=mover.label, to=same.label)
         else:
             yield MoverLeft(seq=0, observed_at=at, label=mover.label)
+
+    def _swapped(self, event: Confused, shift: float) -> Iterator[Observation]:
+        """Told for the time when they met: what was done since was done by who they may be."""
+        one, other = self.movers.get(event.label), self.movers.get(event.other)
+        if one is None or other is None or one.label is None or other.label is None:
+            return
+        t = self._after(max(event.since, one.entered + _STEP_S, other.entered + _STEP_S))
+        if t < min(one.left, other.left):
+            yield MoverSwap(seq=0, observed_at=_utc(t, shift), a=one.label, b=other.label, p=event.p)
 
     def _lies(self, event: Appeared, shift: float) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tms_agents.floor import Appeared, Back, FloorEvent, Stale, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorEvent, Stale, Vanished
 
 
 def told(event: FloorEvent) -> str | None:
@@ -19,6 +19,8 @@ def told(event: FloorEvent) -> str | None:
         return f"mover #{event.label} is out of sight"
     if isinstance(event, Back):
         return f"mover #{event.label} is back at ({event.xy[0]:.2f}, {event.xy[1]:.2f})"
+    if isinstance(event, Confused) and event.p < 1.0:
+        return f"movers #{event.label} and #{event.other} may have been exchanged ({event.p:.0%})"
     return None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from tms_agents.floor import Appeared, Back, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Stale, Vanished
 
 
 class Listener:
@@ -20,6 +20,10 @@ class Listener:
         if isinstance(event, Appeared):
             assert event.label not in self.kinds | dict.fromkeys(self.before)
             self.kinds[event.label] = event.kind
+            return
+        if isinstance(event, Confused):
+            assert {event.label, event.other} <= self.kinds.keys() | self.before and event.label != event.other
+            assert 0.0 < event.p <= 1.0 and event.since <= event.t
             return
         assert event.label in self.kinds
         if isinstance(event, Stale):

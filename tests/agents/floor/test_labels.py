@@ -9,10 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tms_agents.floor import Appeared, Back, FloorLabel, Moved, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorLabel, Moved, Vanished
 from tms_agents.floor.labels import Labels
 from tms_schemas.events import Near
-from tms_schemas.observation import LabelAppeared, LabelMoved, LabelVanished, MoverEntered, MoverLeft, Transfer
+from tms_schemas.observation import (
+    LabelAppeared,
+    LabelMoved,
+    LabelVanished,
+    MoverEntered,
+    MoverLeft,
+    MoverSwap,
+    Transfer,
+)
 
 COV = (0.01, 0.0, 0.01)
 SHIFT = 1_000_000.0
@@ -143,6 +151,23 @@ def test_who_was_there_before_has_what_he_seemed_to_hold_under_another_label():
     assert isinstance(one, Transfer) and (one.from_, one.to) == (entered[1].label, entered[0].label)
     (left,) = floor.observations([Vanished(13.0, 1, 12.9, 13.0, into=7)])
     assert isinstance(left, MoverLeft) and left.label == entered[0].label
+
+
+def test_who_may_have_been_exchanged_is_told_for_when_they_met():
+    floor = labels()
+    entered = floor.observations([mover(10.0, 1), mover(11.0, 2, (2.0, 1.0))])
+    (one,) = floor.observations([Confused(30.0, 1, 2, 0.3, 20.0)])
+    assert isinstance(one, MoverSwap) and (one.a, one.b, one.p) == (entered[0].label, entered[1].label, 0.3)
+    assert at(one) == pytest.approx(20.0)
+    # Of one who has left, too; never before both were there, nor before what an inventory tells.
+    told = floor.observations([Vanished(31.0, 2, 30.9, 31.0), Confused(31.0, 1, 2, 0.2, 10.5)])
+    assert [type(one) for one in told] == [MoverLeft, MoverSwap] and 11.0 < at(told[1]) < at(told[0])
+    floor.inventory([FloorLabel(1, "mover", (1.0, 1.0), COV, 10.0, 32.0)], 32.0)
+    floor.observations([mover(33.0, 3)])
+    (late,) = floor.observations([Confused(34.0, 1, 3, 0.2, 20.0)])
+    assert at(late) > 33.0
+    floor.observations([mover(40.0, 4, robot=True)])
+    assert floor.observations([Confused(41.0, 3, 4, 0.2, 40.5), Confused(41.0, 3, 9, 0.2, 40.5)]) == []
 
 
 def test_robots_report_themselves_and_are_named_by_where_they_were():

@@ -112,16 +112,24 @@ class Association:
         for bodies, belief in zip(self.hypotheses, self._now.beliefs[: self._count], strict=True):
             christen(bodies, belief, index, *((np.nan, np.nan) if lost is None else lost))
 
-    def rename(self, t: float) -> None:
-        """Give people their own names back."""
-        if not renamed(self.bodies, self._now.beliefs[0], t, self.scattered, self._names):
-            return
+    @property
+    def belief(self) -> Array:
+        """How likely each body of the best hypothesis is who has each name (n, n), until the next scan."""
+        belief: Array = self._now.beliefs[0]
+        return belief
+
+    def rename(self, t: float) -> list[tuple[int, int]]:
+        """Give people their own names back: the labels that are exchanged, one pair after the other."""
+        if not renamed(self.bodies, self.belief, t, self.scattered, self._names):
+            return []
         changed = np.flatnonzero(self._names != np.arange(self._names.size))
         source = self._names[changed]
+        exchanges = _exchanges(self._names, self.bodies["label"])
         for bodies, belief in zip(self.hypotheses, self._now.beliefs[: self._count], strict=True):
             for field in NAMED:
                 bodies[field][changed] = bodies[field][source]
             belief[:, changed] = belief[:, source]
+        return exchanges
 
     @property
     def hypotheses(self) -> Any:
@@ -201,3 +209,18 @@ class Association:
         ):
             array[:n] = unpack(saved[name], array[:n])
         self.scattered[:] = unpack(saved["scattered"], self.scattered)
+
+
+def _exchanges(names: NDArray[np.int64], labels: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Exchanges of two labels, one after the other, that come to what happens if each body gets the label of another.
+
+    ``names`` (n,): whose; of every circle the first exchanges its label with all others of it in turn.
+    """
+    found, done = [], set[int]()
+    for first in range(names.size):
+        following = int(names[first])
+        while following != first and first not in done:
+            found.append((int(labels[first]), int(labels[following])))
+            done.add(following)
+            following = int(names[following])
+    return found

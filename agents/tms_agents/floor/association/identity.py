@@ -77,6 +77,18 @@ def _posterior(bodies: Any, b: int, belief: Array, scattered: Array, out: Array)
 
 
 @njit(cache=True)
+def exchanged(bodies: Any, belief: Array, one: int, two: int, scattered: Array) -> float:
+    """How likely it is that two bodies have each other's names, if each has one of these two; 0: there is no doubt."""
+    prior, own = belief[one, two] + belief[two, one], belief[one, one] + belief[two, two]
+    if prior <= 0.0:
+        return 0.0
+    a, b = bodies[one], bodies[two]
+    more = likeness(a, b, scattered) + likeness(b, a, scattered)
+    more -= likeness(a, a, scattered) + likeness(b, b, scattered)
+    return float(prior / (prior + own * np.exp(-more)))
+
+
+@njit(cache=True)
 def unite(
     bodies: Any,
     belief: Array,

@@ -12,6 +12,7 @@ from tms_agents.floor.association.association import OWN, Association
 from tms_agents.floor.events import Appeared, Back, Covariance, FloorEvent, FloorLabel, Moved, Stale, Vanished
 from tms_agents.floor.feet.place import place, tell
 from tms_agents.floor.movers.absent import Absent
+from tms_agents.floor.movers.doubts import Doubts
 from tms_agents.floor.movers.flickering import Flickering
 from tms_agents.floor.movers.reappearing import STEPS_S, missing_one
 from tms_agents.floor.movers.review import (
@@ -83,7 +84,7 @@ class Tracks:
         self.flickering = Flickering()
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
-        self._told = Told(self.bodies.size)
+        self._told, self._doubts = Told(self.bodies.size), Doubts(self.bodies.size)
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
 
     @property
@@ -93,7 +94,7 @@ class Tracks:
 
     def save(self) -> dict[str, Any]:
         """JSON values, without those of the association."""
-        told = {"told": self._told.save(), "strides": list(self.strides)}
+        told = {"told": self._told.save(), "doubts": self._doubts.save(), "strides": list(self.strides)}
         return {"absent": self.absent.save(), "flickering": self.flickering.save(), **told}
 
     def restore(self, saved: Any) -> None:
@@ -102,6 +103,7 @@ class Tracks:
         self.flickering.restore(saved["flickering"])
         self.strides = [(float(t), float(x), float(y), float(matters)) for t, x, y, matters in saved["strides"]]
         self._told.restore(saved["told"])
+        self._doubts.restore(saved["doubts"])
 
     def review(
         self,
@@ -124,7 +126,8 @@ class Tracks:
         judge(self.bodies, t, dt, sight, self._waits, self._actions, bool(self._region.polygons), learned, legs)
         self._see_off(t)
         self._believe_steps(t)
-        self._association.rename(t)
+        confused = self._doubts.look(self.bodies, self._association.belief, self._association.scattered, t)
+        confused += self._doubts.given_back(self._association.rename(t), t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t) + self._gone_out(t)
         for index in np.flatnonzero(self._actions).tolist():
             body, action = self.bodies[index], int(self._actions[index])
@@ -154,7 +157,7 @@ class Tracks:
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             elif action in (MOVED, BROAD):
                 events.append(Moved(t, *self._tell(index, t)))
-        return self._told.agree(events, self.bodies, t)
+        return self._told.agree([*events, *confused, *self._doubts.gone(events, t)], self.bodies, t)
 
     def labels(self, t: float) -> list[FloorLabel]:
         """The movers there are, but for those who are ``awaited``."""
