@@ -83,7 +83,7 @@ class Outbox:
         """What is in the queue into the spool, the state on the disk."""
         while not self._queue.empty():
             await self._agent.observations(*self._queue.get_nowait())
-        save_state(self._file, self._name, await _now(self._memory()))
+        save_state(self._file, self._name, await self._remembered())
 
     async def post_inventory(self) -> None:
         self.post([await _now(self._inventory())])
@@ -114,9 +114,12 @@ class Outbox:
                 async with asyncio.timeout(_SAVE_S):
                     await self._dirty.wait()
             self._dirty.clear()
-            state = await _now(self._memory())
+            state = await self._remembered()
             await asyncio.to_thread(save_state, self._file, self._name, state)
             await asyncio.sleep(self._save_pause_s)
+
+    async def _remembered(self) -> dict[str, Any]:
+        return await _now(self._memory()) | {"told": self._clocks.told}
 
     def _lost(self) -> None:
         """An event never reached the spool: say what is there instead, until that is taken."""

@@ -87,7 +87,9 @@ class Running:
         self.newest: datetime | None = None
 
     def now(self) -> datetime:
-        return datetime.fromtimestamp(self._clock(), UTC)
+        """By the clock, and not before anything that was posted: it may have been set back meanwhile."""
+        now = datetime.fromtimestamp(self._clock(), UTC)
+        return now if self.newest is None else max(now, self.newest)
 
     def new_label(self) -> str:
         """A label id that the agent never used."""

@@ -44,7 +44,7 @@ async def watch_devices(
 ) -> AsyncGenerator[dict[str, Any], None]:
     """Read the devices; nothing is posted, nothing is written. What stood on the boards when an agent ran is known."""
     saved = peek_state(state_path(config.spool.path), config.agent)
-    clocks = Clocks(time.time, time.monotonic, after=float(saved.get("t", "-inf")))
+    clocks = Clocks.resumed(saved, time.time, time.monotonic)
     numbers = itertools.count(1)
     cabinet = Cabinet(config, calibrations, clocks, lambda: f"new/{next(numbers)}", saved)
     work = [asyncio.create_task(listen_to_board(cabinet, one)) for one in config.boards]

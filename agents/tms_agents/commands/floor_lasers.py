@@ -93,9 +93,8 @@ async def _record(config: FloorConfig, arguments: argparse.Namespace, writer: Sc
 
     def take(name: str, scans: Sequence[Scan]) -> None:
         mounted = [lasers[name].mounted(scan) for scan in scans]
-        shift = clocks.shift_s
         for t, scan in zip(lasers[name].times.of(clocks.now(), mounted), mounted, strict=True):
-            writer.add(name, lasers[name].pose, t + shift, scan)
+            writer.add(name, lasers[name].pose, t, scan)  # evenly, whatever the computer's clock does
         _show(f"{writer.written} scans")
 
     def changed(name: str, state: DeviceState) -> None:

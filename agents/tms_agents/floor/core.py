@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,7 @@ class Floor:
         self.lasers = {one.name: Laser(one, poses.get(one.name), after=clocks.now()) for one in config.lasers}
         self.labels = Labels(
             new_label,
-            lambda: clocks.shift_s,
+            clocks.in_step,
             report_m=config.report_m,
             report_s=config.report_s,
             tells_robots=config.tells_robots,
@@ -104,7 +104,7 @@ class Floor:
     def inventory(self) -> Inventory:
         now = self._clocks.now()
         labels = self.labels.inventory(self.seen(), now)
-        return Inventory(seq=0, observed_at=datetime.fromtimestamp(now + self._clocks.shift_s, UTC), labels=labels)
+        return Inventory(seq=0, observed_at=self._clocks.in_step(now), labels=labels)
 
     def to_dict(self) -> dict[str, Any]:
         if self.estimator is None:
@@ -123,10 +123,9 @@ class Floor:
         if not events:
             return []
         found = self.labels.observations(events)
-        shift = self._clocks.shift_s
         for event in events:
             if (text := told(event)) is not None:
-                self.story.append((datetime.fromtimestamp(event.t + shift, UTC), text))
+                self.story.append((self._clocks.in_step(event.t), text))
         return found
 
     def _tell_places(self) -> None:

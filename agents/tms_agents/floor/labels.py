@@ -6,7 +6,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Vanished
@@ -63,7 +63,7 @@ class Mover:
 
 
 class Labels:
-    """Label ids of the room for the estimator's numbers. ``shift_s`` makes sensor times Unix times.
+    """Label ids of the room for the estimator's numbers. ``utc`` tells the time of day of a sensor time.
 
     ``told_until``: the sensor time of the last inventory; nothing is told to have happened before that, because an
     inventory says how things were then.
@@ -72,13 +72,13 @@ class Labels:
     def __init__(
         self,
         new_label: Callable[[], str],
-        shift_s: Callable[[], float],
+        utc: Callable[[float], datetime],
         *,
         report_m: float = 0.25,
         report_s: float = 0.5,
         tells_robots: bool = False,
     ) -> None:
-        self._new_label, self._shift_s = new_label, shift_s
+        self._new_label, self._utc = new_label, utc
         self._report_m, self._report_s, self._tells_robots = report_m, report_s, tells_robots
         #: Of things: label, place and when it was told to have appeared; of movers that are here or were until lately.
         self.things: dict[int, tuple[str, Xy, float]] = {}
@@ -87,8 +87,7 @@ class Labels:
 
     def observations(self, events: Sequence[FloorEvent]) -> list[Observation]:
         """What is to be posted of the events of one scan; vanish, mover, appear, each with its time."""
-        shift = self._shift_s()
-        made = [one for event in sorted(events, key=_rank) for one in self._told(event, shift)]
+        made = [one for event in sorted(events, key=_rank) for one in self._told(event)]
         if events:
             self._forget(events[0].t)
         return made
@@ -99,7 +98,7 @@ class Labels:
         for mover in self.movers.values():
             gap = math.dist(mover.xy, mover.told_xy)
             if gap > _REST_M / 2 and t - mover.moved_at >= _REST_S and math.isinf(mover.left):
-                found += self._moved(mover, mover.moved_at, self._shift_s())
+                found += self._moved(mover, mover.moved_at)
         return found
 
     def inventory(self, labels: Iterable[FloorLabel], t: float) -> list[InventoryLabel]:
@@ -150,21 +149,21 @@ class Labels:
 
     # below: one event
 
-    def _told(self, event: FloorEvent, shift: float) -> Iterator[Observation]:
+    def _told(self, event: FloorEvent) -> Iterator[Observation]:
         if isinstance(event, Appeared):
-            yield from self._entered(event, shift) if event.kind == "mover" else self._lies(event, shift)
+            yield from self._entered(event) if event.kind == "mover" else self._lies(event)
         elif isinstance(event, Vanished):
-            yield from self._left(event, shift) if event.label in self.movers else self._taken(event, shift)
+            yield from self._left(event) if event.label in self.movers else self._taken(event)
         elif isinstance(event, Moved | Back) and (mover := self.movers.get(event.label)) is not None:
-            yield from self._walks(mover, event, shift)
+            yield from self._walks(mover, event)
         elif isinstance(event, Confused):
-            yield from self._swapped(event, shift)
+            yield from self._swapped(event)
 
-    def _entered(self, event: Appeared, shift: float) -> Iterator[Observation]:
+    def _entered(self, event: Appeared) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))
         mover = self._meet(event.label, event.robot, t, event.xy, event.cov)
         if mover.label is not None:
-            at = _utc(t, shift)
+            at = self._utc(t)
             yield MoverEntered(seq=0, observed_at=at, label=mover.label, **_place(event.xy, event.cov))
 
     def _meet(self, number: int, robot: bool, t: float, xy: Xy, cov: Cov) -> Mover:
@@ -173,44 +172,44 @@ class Labels:
         mover.places.append((t, xy))
         return mover
 
-    def _walks(self, mover: Mover, event: Moved | Back, shift: float) -> Iterator[Observation]:
+    def _walks(self, mover: Mover, event: Moved | Back) -> Iterator[Observation]:
         if math.dist(event.xy, mover.xy) > 0.01:
             mover.moved_at = event.t
         mover.xy, mover.cov = event.xy, event.cov
         mover.places.append((event.t, event.xy))
         gap = math.dist(event.xy, mover.told_xy)
         if gap >= self._report_m or (gap >= _REST_M and event.t - mover.told_at >= self._report_s):
-            yield from self._moved(mover, event.t, shift)
+            yield from self._moved(mover, event.t)
 
-    def _moved(self, mover: Mover, t: float, shift: float) -> list[Observation]:
+    def _moved(self, mover: Mover, t: float) -> list[Observation]:
         t = max(self._after(t), mover.told_at + _STEP_S)
         mover.told_at, mover.told_xy = t, mover.xy
         if mover.label is None:
             return []
-        return [LabelMoved(seq=0, observed_at=_utc(t, shift), label=mover.label, **_place(mover.xy, mover.cov))]
+        return [LabelMoved(seq=0, observed_at=self._utc(t), label=mover.label, **_place(mover.xy, mover.cov))]
 
-    def _left(self, event: Vanished, shift: float) -> Iterator[Observation]:
+    def _left(self, event: Vanished) -> Iterator[Observation]:
         mover = self.movers[event.label]
         mover.left = max(self._after(event.t), mover.told_at + _STEP_S)
         if mover.label is None:
             return
         same = None if event.into is None else self.movers.get(event.into)
-        at = _utc(mover.left, shift)
+        at = self._utc(mover.left)
         if same is not None and same.label is not None:
             yield Transfer(seq=0, observed_at=at, from_=mover.label, to=same.label)
         else:
             yield MoverLeft(seq=0, observed_at=at, label=mover.label)
 
-    def _swapped(self, event: Confused, shift: float) -> Iterator[Observation]:
+    def _swapped(self, event: Confused) -> Iterator[Observation]:
         """Told for the time when they met: what was done since was done by who they may be."""
         one, other = self.movers.get(event.label), self.movers.get(event.other)
         if one is None or other is None or one.label is None or other.label is None:
             return
         t = self._after(max(event.since, one.entered + _STEP_S, other.entered + _STEP_S))
         if t < min(one.left, other.left):
-            yield MoverSwap(seq=0, observed_at=_utc(t, shift), a=one.label, b=other.label, p=event.p)
+            yield MoverSwap(seq=0, observed_at=self._utc(t), a=one.label, b=other.label, p=event.p)
 
-    def _lies(self, event: Appeared, shift: float) -> Iterator[Observation]:
+    def _lies(self, event: Appeared) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))
         label = self._new_label()
         self.things[event.label] = (label, event.xy, t)
@@ -219,9 +218,9 @@ class Labels:
         if event.width_m is not None:
             told["size_m"] = round(event.width_m, 4)
         place = _place(event.xy, event.cov)
-        yield LabelAppeared(seq=0, observed_at=_utc(t, shift), label=label, kind="floor", **place, **told)
+        yield LabelAppeared(seq=0, observed_at=self._utc(t), label=label, kind="floor", **place, **told)
 
-    def _taken(self, event: Vanished, shift: float) -> Iterator[Observation]:
+    def _taken(self, event: Vanished) -> Iterator[Observation]:
         """Told for the time when the likeliest one was nearest: what is taken unseen is known seconds later."""
         if (thing := self.things.pop(event.label, None)) is None:
             return
@@ -232,7 +231,7 @@ class Labels:
         t = max(self._after(event.latest if near is None else near), since + _STEP_S)
         who = self._who(event.candidates, t)
         told: dict[str, Any] = {} if who is None else {"dest": who}
-        yield LabelVanished(seq=0, observed_at=_utc(t, shift), label=label, **told)
+        yield LabelVanished(seq=0, observed_at=self._utc(t), label=label, **told)
 
     def _who(self, candidates: Sequence[tuple[int, float]], t: float) -> str | Near | None:
         """The mover that acted, if that is sure and it was here then; robots are named by where they were."""
@@ -263,7 +262,3 @@ def _place(xy: Xy, cov: Cov) -> dict[str, Any]:
 
 def _rounded(xy: Xy) -> Xy:
     return (round(xy[0], 4), round(xy[1], 4))
-
-
-def _utc(t: float, shift: float) -> datetime:
-    return datetime.fromtimestamp(t + shift, UTC)

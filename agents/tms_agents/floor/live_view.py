@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ class LiveView:
         """The newest view; the states of the lasers are those of this moment."""
         self._looked = self._even()
         config, made = self._floor.config, self._view
-        at = datetime.fromtimestamp(self._clocks.now() + self._clocks.shift_s, UTC)
+        at = self._clocks.in_step(self._clocks.now())
         lasers = []
         for name, laser in self._floor.lasers.items():
             state = laser.state

@@ -55,7 +55,7 @@ async def run(
     posted = Posted()
     async with running(config, drain_s=drain_s, heartbeat_s=config.heartbeat_s, posted=posted, clock=clock) as agent:
         saved = load_state(state_path(config.spool.path), config.agent)
-        clocks = Clocks(clock, even, after=float(saved.get("t", "-inf")))
+        clocks = Clocks.resumed(saved, clock, even)
         floor = Floor(config, poses, clocks, agent.new_label, saved)
         work = _Work(config, floor, agent, clocks)
         try:

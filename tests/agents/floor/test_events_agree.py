@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from datetime import UTC, datetime
 
 import pytest
 from floor_listener import Listener
@@ -47,7 +48,7 @@ def test_events_and_what_is_posted_tell_what_labels_there_are(scene: str, seed: 
     room = Scene(region=known.region, gates=known.gates, seats=known.seats, robots=known.robots)
     estimator, listener = FloorEstimator(sensors, scene=room), Listener()
     server, numbers, awaited = Server(), itertools.count(), 0
-    labels = Labels(lambda: f"floor/{next(numbers)}", lambda: 0.0, tells_robots=True)
+    labels = Labels(lambda: f"floor/{next(numbers)}", lambda t: datetime.fromtimestamp(t, UTC), tells_robots=True)
     for number, frame in enumerate(world.scans()):
         events = estimator.scan(frame.sensor, frame.t, frame.ranges)
         for event in events:

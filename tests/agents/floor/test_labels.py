@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from datetime import UTC, datetime
 
 import pytest
 from hypothesis import given
@@ -28,7 +29,7 @@ SHIFT = 1_000_000.0
 
 def labels(**options):
     numbers = itertools.count(1)
-    return Labels(lambda: f"floor/{next(numbers)}", lambda: SHIFT, **options)
+    return Labels(lambda: f"floor/{next(numbers)}", lambda t: datetime.fromtimestamp(t + SHIFT, UTC), **options)
 
 
 def mover(t, label, xy=(1.0, 1.0), since=None, robot=False):

@@ -46,7 +46,7 @@ async def watch(config: FloorConfig, poses: Mapping[str, Pose]) -> AsyncGenerato
 async def watch_lasers(config: FloorConfig, poses: Mapping[str, Pose]) -> AsyncGenerator[dict[str, Any], None]:
     """Read the lasers; nothing is posted, nothing is written. What an agent learnt before is known."""
     saved = peek_state(state_path(config.spool.path), config.agent)
-    clocks = Clocks(time.time, time.monotonic, after=float(saved.get("t", "-inf")))
+    clocks = Clocks.resumed(saved, time.time, time.monotonic)
     numbers = itertools.count(1)
     floor = Floor(config, poses, clocks, lambda: f"new/{next(numbers)}", saved)
     mind = Understanding(floor, clocks, lambda observations: None)

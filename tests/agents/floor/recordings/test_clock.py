@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from floor_rig import Room, sweep
@@ -65,12 +67,41 @@ def test_a_clock_that_is_set_does_not_disturb_the_past():
     """What happened is told in step with what was told before, also while the computer's clock was set back."""
     unix, even = [1000.0], [0.0]
     clocks = Clocks(lambda: unix[0], lambda: even[0])
-    assert clocks.utc(clocks.now()).timestamp() == 1000.0
-    assert clocks.now() + clocks.shift_s == pytest.approx(1000.0)
+    before = clocks.now()
+    assert clocks.in_step(before).timestamp() == 1000.0
+    assert clocks.in_step(before - 5.0).timestamp() == 995.0
     unix[0] -= 50.0
     even[0] += 2.0
-    assert clocks.utc(clocks.now()).timestamp() == 1000.0
-    assert clocks.now() + clocks.shift_s == pytest.approx(1000.0)
+    for t, told in ((-5.0, 995.0), (0.0, 1000.0), (1.0, 1000.0), (2.0, 1000.0)):
+        assert clocks.in_step(before + t).timestamp() == pytest.approx(told)
+    assert clocks.ahead_s == pytest.approx(50.0)
+    unix[0] += 60.0
+    even[0] += 60.0
+    assert clocks.in_step(before + 61.0).timestamp() == pytest.approx(unix[0] - 1.0)
+
+
+@given(st.lists(st.tuples(st.floats(0, 10), st.floats(-1e4, 0)), min_size=1, max_size=20))
+def test_what_happened_later_is_not_told_for_earlier(steps):
+    """However often the clock is set back: the order of what happened is that of the times told, also of late news."""
+    unix, even, told = 1.7e9, 100.0, []
+    clocks = Clocks(lambda: unix, lambda: even)
+    for elapsed, jump in steps:
+        unix, even = unix + elapsed + jump, even + elapsed
+        told += [(t, clocks.in_step(t)) for t in (clocks.now() - 3.0, clocks.now() - 0.1, clocks.now())]
+    by_time = [at for _, at in sorted(told)]
+    assert all(b.timestamp() - a.timestamp() > -1e-5 for a, b in itertools.pairwise(by_time))
+
+
+def test_a_clock_that_was_set_back_between_two_runs_is_said_once(caplog):
+    clocks = Clocks.resumed({"t": 500.0, "told": 5000.0}, lambda: 1400.0, lambda: 0.0)
+    assert clocks.now() == 1400.0
+    assert [clocks.in_step(t).timestamp() for t in (1300.0, 1400.0)] == [4900.0, 5000.0]
+    assert clocks.told == 5000.0 and clocks.ahead_s == 3600.0
+    assert [one.getMessage().partition(":")[0] for one in caplog.records] == [
+        "the clock of this computer is 3600 s behind what was told already"
+    ]
+    for nothing in ({}, {"t": None, "told": "late"}, {"t": float("nan")}):
+        assert Clocks.resumed(nothing, lambda: 1400.0, lambda: 0.0).told == 1400.0
 
 
 def test_the_room_of_the_tests_is_what_it_says():
