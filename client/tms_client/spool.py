@@ -59,14 +59,17 @@ class Spool:
         """Open or create.
 
         Raises:
-            SpoolError: the file belongs to another agent, is open in another process, or is no spool.
+            SpoolError: the file belongs to another agent, is open in another process, is no spool, or cannot be made.
         """
         self.agent = agent
         self._max_items, self._max_bytes, self._max_dead = max_items, max_bytes, max_dead
         self._clock = clock
         self._lock = threading.RLock()
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        self._db = sqlite3.connect(path, timeout=1.0, isolation_level=None, check_same_thread=False)
+        try:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(path, timeout=1.0, isolation_level=None, check_same_thread=False)
+        except (OSError, sqlite3.Error) as error:
+            raise SpoolError(f"spool {path}: {getattr(error, 'strerror', None) or error}") from error
         try:
             self._open()
         except (sqlite3.Error, SpoolError) as error:

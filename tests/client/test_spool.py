@@ -112,6 +112,13 @@ def test_a_file_that_is_no_spool(tmp_path):
         Spool(tmp_path / "s", "a")
 
 
+def test_a_place_where_none_can_be_made(tmp_path):
+    (tmp_path / "file").write_text("")
+    for place, why in (("file/s", "exists|Not a directory"), (".", "unable to open")):
+        with pytest.raises(SpoolError, match=why):
+            Spool(tmp_path / place, "a")
+
+
 STEPS = st.lists(st.sampled_from(["put", "put2", "ack", "bury", "agree", "reopen", "label"]), max_size=30)
 
 
