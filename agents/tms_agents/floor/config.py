@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, ValidationInfo, create_model, field_validator
 
-from tms_agents.config import AgentConfig, LocalPath, Seconds, Section, need_names_of_their_own
+from tms_agents.config import AgentConfig, LocalPath, Seconds, Section, misplaced, need_names_of_their_own
+from tms_agents.floor.polygons import fault_of
 from tms_agents.floor.settings import FloorSettings, Pose, Scene
 from tms_agents.floor.sources import LaserSource
 from tms_agents.running import Heartbeat
@@ -17,6 +19,8 @@ from tms_schemas.base import Metres, Polygon, Xy
 #: Names become parts of messages and tables.
 Short = Annotated[str, Field(pattern=r"^[^\x00-\x1f\"]{1,64}$")]
 _Length = Annotated[float, Field(gt=0, le=100)]
+#: A robot that is larger was measured in centimetres.
+_Footprint = Annotated[float, Field(gt=0, le=5)]
 
 
 class PoseSection(Section):
@@ -59,12 +63,22 @@ class SceneSection(Section):
     seats: Annotated[list[Polygon], Field(max_length=50)] = []
     mirrors: Annotated[list[tuple[Xy, Xy]], Field(max_length=10)] = []
 
+    @field_validator("gates", "masks", "seats", "mirrors", mode="before")
+    @classmethod
+    def _several(cls, value: Any, info: ValidationInfo) -> Any:
+        """One where a list of them is wanted is a slip with a bewildering message."""
+        with contextlib.suppress(TypeError, LookupError):
+            if isinstance(value[0][0], int | float):
+                raise ValueError(f"a list of {info.field_name} is wanted, this is a single one: put [ ] around it")
+        return value
+
     @field_validator("*", mode="after")
     @classmethod
     def _possible(cls, value: Any, info: ValidationInfo) -> Any:
-        polygons = [value] if info.field_name == "region" else value
-        if info.field_name != "mirrors" and any(one is not None and _area(one) < 1e-4 for one in polygons):
-            raise ValueError("a polygon without an area")
+        polygons = [] if info.field_name == "mirrors" else [value] if info.field_name == "region" else value
+        for number, one in enumerate(polygons):
+            if one is not None and (fault := fault_of(one)):
+                raise ValueError(fault) if info.field_name == "region" else misplaced((number,), fault)
         Scene(**{str(info.field_name): value})
         return value
 
@@ -72,8 +86,8 @@ class SceneSection(Section):
 class RobotSection(Section):
     """A robot's footprint as the laser sees it, metres. Robots report themselves; ``report``: this agent does, too."""
 
-    width: _Length
-    length: _Length
+    width: _Footprint
+    length: _Footprint
     report: bool = False
 
 
@@ -111,6 +125,10 @@ class FloorConfig(AgentConfig):
     @classmethod
     def _named(cls, value: list[LaserSection]) -> list[LaserSection]:
         need_names_of_their_own("laser", [one.name for one in value])
+        for number, one in enumerate(value):
+            for other in value[:number]:
+                if one.source.place == other.source.place:
+                    raise misplaced((number, "source"), f"laser {other.name!r} is at {one.source.place} already")
         return value
 
     @field_validator("estimator")
@@ -148,8 +166,3 @@ _Settings: type[Section] = create_model(  # type: ignore[call-overload]
     __base__=Section,
     **{one.name: (Annotated[float, Field(gt=0)], getattr(FloorSettings(), one.name)) for one in fields(FloorSettings)},
 )
-
-
-def _area(polygon: list[Xy]) -> float:
-    corners = zip(polygon, [*polygon[1:], polygon[0]], strict=True)
-    return abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in corners)) / 2

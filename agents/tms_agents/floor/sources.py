@@ -81,6 +81,10 @@ class LmsLaser(Section):
         self._session()
         return self
 
+    @property
+    def place(self) -> str:
+        return self.device
+
     def _session(self) -> Lms200Session:
         return Lms200Session(
             output=self.output,
@@ -125,6 +129,11 @@ class ColaLaser(Section):
     def _possible(self) -> ColaLaser:
         self._session()
         return self
+
+    @property
+    def place(self) -> str:
+        """Several layers of one device are several lasers."""
+        return f"{self.host}:{self.port}" + (f", layer {self.layer}" if self.layer else "")
 
     def _session(self) -> ColaSession:
         return ColaSession(

@@ -91,6 +91,24 @@ def test_there_is_an_example_for_each_device_and_each_part_of_a_room():
         (("[scene]", '[recording]\npath = "scans.bin"\n[scene]'), "the name of a recording ends in .scans"),
         (("heartbeat_s = 1.0", 'feet = "legs"'), "feet: Extra inputs are not permitted"),
         (("[scene]", LASER + "[scene]"), ": lasers.1.name: two lasers are called 'laser'"),
+        (
+            ("[scene]", LASER.replace('"laser"', '"other"') + "[scene]"),
+            ": lasers.1.source: laser 'laser' is at /dev/null already",
+        ),
+        (
+            ("[[0, 0], [5, 0], [5, 4]]", "[[0, 0], [5, 4], [5, 0], [0, 3]]"),
+            ": scene.region: its sides 1 and 3 cross: give the corners in the order of a walk around it",
+        ),
+        (
+            ("seats = [", "seats = [[[0, 0], [1, 1], [1, 0], [0, 2]], "),
+            ": scene.seats.0: its sides 1 and 3 cross: give the corners",
+        ),
+        (
+            ("[[[1, 1], [2, 1], [2, 2]]]", "[[1, 1], [2, 1], [2, 2]]"),
+            ": scene.seats: a list of seats is wanted, this is a single one: put [ ] around it",
+        ),
+        (("[scene]", "[scene]\nmirrors = [[1, 1], [2, 1]]"), "a list of mirrors is wanted"),
+        (("[scene]", "[[robots]]\nwidth = 45\nlength = 45\n[scene]"), "robots.0.width: Input should be less than or"),
     ],
 )
 def test_what_is_wrong_is_one_line(tmp_path, capsys, change, says):
@@ -101,6 +119,13 @@ def test_what_is_wrong_is_one_line(tmp_path, capsys, change, says):
     assert cli.main(["agent", "floor", "--config", str(path)]) == 2
     out, err = capsys.readouterr()
     assert says in err and err.startswith(f"tms: {path}: ") and err.count("\n") == 1 and not out
+
+
+def test_two_layers_of_one_scanner_are_two_lasers(tmp_path):
+    path = tmp_path / "floor.toml"
+    low, high = (laser_toml(f"{{ {COLA}, layer = {n} }}", name=f"layer {n}") for n in (0, 1))
+    path.write_text(config_toml("lab", "http://127.0.0.1:1", low + high))
+    assert len(read_config(path, FloorConfig).lasers) == 2
 
 
 def test_scene_and_settings_reach_the_estimator(tmp_path):

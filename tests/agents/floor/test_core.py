@@ -47,7 +47,8 @@ class Bench:
 
     def __init__(self, folder: Path, poses, saved=None, start: float = 1000.0, **laser: str) -> None:
         text = "".join(
-            laser_toml('{ kind = "scip", host = "h" }', pose, name, laser.get(name, "")) for name, pose in poses.items()
+            laser_toml(f'{{ kind = "scip", host = "{name}" }}', pose, name, laser.get(name, ""))
+            for name, pose in poses.items()
         )
         path = folder / "floor.toml"
         path.write_text(config_toml("lab", "http://127.0.0.1:1", text, more=QUICK + DOORS))

@@ -31,6 +31,9 @@ _MOST_STILL = 5000
 _WAIT_S, _SHOW_S = 20.0, 0.5
 #: More than this is no fit that an installer wants.
 _LEAST_MATCHED, _MOST_RMSE_M = 0.3, 0.02
+#: By walkers: how well another pose may explain the same, and how unsure the pose may be (m, rad). In simulated rooms
+#: right ones had 0.33 and less, 9 cm and less; wrong ones, of 5 to 15 s seen by both, 0.6 and more or 15 cm and more.
+_MOST_RIVAL, _UNSURE_M, _UNSURE = 0.6, 0.1, 0.035
 
 
 async def gather(config: FloorConfig, names: Sequence[str], seconds: float, show: Say) -> list[Recorded]:
@@ -170,8 +173,18 @@ def by_walkers(known: Recorded, recorded: Recorded, settings: FloorSettings, say
     _tell(recorded.name, recorded.pose, found.pose, say)
     rmse, offset = found.rmse_m * 1000, found.offset_s
     say(f"  {found.places} places seen by both, RMSE {rmse:.0f} mm, clocks {offset:+.2f} s apart")
-    if found.rmse_m > 0.12 and not force:
-        raise CommandError(f"laser {recorded.name}: that is no good fit; have one person walk there (--force keeps it)")
+    away, turned = found.sd[0] * 1000, math.degrees(found.sd[1])
+    say(f"  uncertainty: {away:.0f} mm, {turned:.1f} degrees")
+    if found.rmse_m > 0.12:
+        wrong = "that is no good fit; have one person walk there"
+    elif found.rival > _MOST_RIVAL:
+        wrong = "it may as well stand elsewhere; have one person walk there, longer, and not to and fro"
+    elif found.sd[0] > _UNSURE_M or found.sd[1] > _UNSURE:
+        wrong = "that is not sure enough; have one person walk longer through all that both lasers see"
+    else:
+        return found
+    if not force:
+        raise CommandError(f"laser {recorded.name}: {wrong} (--force keeps it)")
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,11 @@ _STEP_S, _SHORTEST_S = 0.1, 1.5
 #: Two lasers see other sides of a leg: the same person is this near in both.
 _SAME_M = 0.25
 _MOST_OFFSET_S = 0.5
+#: A pose so far from another one (m, rad) is another pose.
+_OTHER_M, _OTHER = 0.5, 0.26
+#: Errors of where a walker is are the same for so many steps, and of so much (m) all the way: of a leg two lasers see
+#: two sides.
+_ALIKE, _SIDES_M = 10, 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +37,18 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class Registration:
-    """Pose of the laser, residual and number of the places that both saw, and how far its clock is behind (s)."""
+    """Pose of the laser, residual and number of the places that both saw, and how far its clock is behind (s).
+
+    ``sd`` are the standard deviations of place and direction (m, rad); ``rival`` is how well the best pose elsewhere
+    explains what was seen, 1 being as well as this one.
+    """
 
     pose: Pose
     rmse_m: float
     places: int
     offset_s: float
+    sd: tuple[float, float]
+    rival: float
 
 
 def walker_tracks(recorded: Recorded, pose: Pose, settings: FloorSettings | None = None) -> list[Track]:
@@ -61,7 +73,7 @@ def register(known: Sequence[Track], local: Sequence[Track]) -> Registration:
     Raises:
         ValueError: nobody was seen by both for long enough, or nobody walked far enough to tell.
     """
-    best: tuple[int, float, float, NDArray[np.float64]] | None = None
+    candidates: list[_Candidate] = []
     for offset in np.arange(-_MOST_OFFSET_S, _MOST_OFFSET_S + 1e-9, 0.05):
         pairs = [_together(one, other, float(offset)) for one in known for other in local]
         pairs = [pair for pair in pairs if len(pair[0]) >= _SHORTEST_S / _STEP_S]
@@ -78,30 +90,44 @@ def register(known: Sequence[Track], local: Sequence[Track]) -> Registration:
             if len(kept_here) < _SHORTEST_S / _STEP_S:
                 continue
             rmse = float(np.sqrt(np.mean(np.sum((_moved(kept_here, move) - kept_there) ** 2, axis=1))))
-            found = (len(kept_here), rmse, float(offset), move)
-            if best is None or _worth(found) > _worth(best):
-                best = found
-    if best is None:
+            candidates.append(_Candidate(len(kept_here), rmse, float(offset), move))
+    if not candidates:
         raise ValueError("nobody was seen walking by both lasers at the same time")
-    places, rmse, offset, move = best
-    return _finished(known, local, places, rmse, offset, move)
+    best = max(candidates, key=lambda one: one.worth)
+    rivals = [one.worth for one in candidates if one.elsewhere(best)]
+    return _finished(known, local, best, max(rivals, default=0.0) / best.worth)
 
 
-def _finished(
-    known: Sequence[Track], local: Sequence[Track], places: int, rmse: float, offset: float, move: NDArray[np.float64]
-) -> Registration:
-    pairs = [_together(one, other, offset) for one in known for other in local]
-    there, _ = _same([pair for pair in pairs if len(pair[0])], move)
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    places: int
+    rmse: float
+    offset: float
+    move: NDArray[np.float64]
+
+    @property
+    def worth(self) -> float:
+        """More places seen together are better, and nearer ones."""
+        return self.places / (0.03 + self.rmse)
+
+    def elsewhere(self, other: _Candidate) -> bool:
+        turned = abs(wrapped(self.move[2] - other.move[2]))
+        return math.dist(self.move[:2], other.move[:2]) > _OTHER_M or turned > _OTHER
+
+
+def _finished(known: Sequence[Track], local: Sequence[Track], best: _Candidate, rival: float) -> Registration:
+    pairs = [_together(one, other, best.offset) for one in known for other in local]
+    there, _ = _same([pair for pair in pairs if len(pair[0])], best.move)
     spread = np.sqrt(np.linalg.eigvalsh(np.cov(there.T))) if len(there) > 2 else np.zeros(2)
     if spread[1] < 0.3:
         raise ValueError("nobody walked far enough before both lasers: half a metre says little of directions")
-    pose = (float(move[0]), float(move[1]), wrapped(move[2]))
-    return Registration(pose, rmse, places, offset)
-
-
-def _worth(found: tuple[int, float, float, NDArray[np.float64]]) -> float:
-    """More places seen together are better, and nearer ones."""
-    return found[0] / (0.03 + found[1])
+    pose = (float(best.move[0]), float(best.move[1]), wrapped(best.move[2]))
+    middle = best.rmse / math.sqrt(len(there) / _ALIKE)
+    turned = middle / float(np.hypot(*spread))
+    away = turned * math.dist(there.mean(axis=0), pose[:2])
+    return Registration(
+        pose, best.rmse, best.places, best.offset, (math.hypot(middle, away, _SIDES_M), turned), min(1.0, rival)
+    )
 
 
 def _together(one: Track, other: Track, offset: float) -> tuple[Array, Array]:

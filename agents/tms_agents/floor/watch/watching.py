@@ -103,7 +103,7 @@ def config_of(recordings: Sequence[Recorded], like: FloorConfig | None = None) -
         lasers.append(
             {
                 "name": one.name,
-                "source": {"kind": "scip", "device": "/dev/null"},
+                "source": {"kind": "scip", "device": one.name},
                 "pose": {"x": x, "y": y, "theta": float(np.arctan2(np.sin(theta), np.cos(theta)))},
                 "range_scale": one.range_scale,
             }
