@@ -10,10 +10,12 @@ from floor_rig import DEPTH, OUTLINE, WIDTH, Room, sweep
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tms_agents.floor.calibration.calibrating import static_points
-from tms_agents.floor.calibration.walkers import register, walker_tracks
+from tms_agents.floor.calibration.calibrating import by_walkers, static_points
+from tms_agents.floor.calibration.walkers import Track, register, walker_tracks
 from tms_agents.floor.recordings.recorded import Recorded, rows_of
 from tms_agents.floor.scan.walls import fit_walls
+from tms_agents.floor.settings import FloorSettings
+from tms_client.cli import CommandError
 
 SWEEP = sweep()
 
@@ -115,3 +117,37 @@ def test_nobody_walked():
     known, other = walk(seconds=5.0)
     with pytest.raises(ValueError, match="nobody was seen"):
         register(walker_tracks(known, A), walker_tracks(other, (0.0, 0.0, 0.0)))
+
+
+def straight(seconds, y, seed=0, *, back=False):
+    """Somebody walks 1 m/s along x, with a centimetre of noise."""
+    t = np.arange(0.0, seconds, 0.1)
+    x = seconds / 2 - t if back else t - seconds / 2
+    noise = np.random.default_rng(seed).normal(0.0, 0.01, (len(t), 2))
+    return Track(t, np.stack([x, np.full(len(t), y)], axis=1) + noise)
+
+
+def test_two_who_walk_straight_do_not_tell_who_is_who():
+    """One laser sees one of them, the other both: it stands on this side or on that one."""
+    found = register([straight(4.0, 1.0, 1)], [straight(4.0, 1.0, 2), straight(4.0, 2.0, 3, back=True)])
+    assert found.rival > 0.9
+
+
+def test_a_way_that_is_too_short_for_a_direction_is_told_so():
+    long, short = (register([straight(s, 1.0, 1)], [straight(s, 1.0, 2)]) for s in (20.0, 2.0))
+    assert long.sd[1] < short.sd[1]
+
+
+@pytest.mark.parametrize(
+    ("people", "seconds", "says"),
+    [(1, 26.0, ""), (1, 11.5, "sure enough"), (0, 9.0, "nobody was seen walking by both")],
+)
+def test_walkers_who_tell_too_little_are_refused(people, seconds, says):
+    known, other = walk(seconds=seconds, people=people)
+    said = []
+    if not says:
+        found = by_walkers(known, other, FloorSettings(), said.append, force=False)
+        assert math.dist(found.pose[:2], B[:2]) < 0.07
+        return
+    with pytest.raises(CommandError, match=says):
+        by_walkers(known, other, FloorSettings(), said.append, force=False)
