@@ -31,6 +31,8 @@ _MOST_STILL = 5000
 _WAIT_S, _SHOW_S = 20.0, 0.5
 #: More than this is no fit that an installer wants.
 _LEAST_MATCHED, _MOST_RMSE_M = 0.3, 0.02
+#: A share of beams at a wall that is larger by so much speaks for itself.
+_CLEARLY = 0.1
 #: By walkers: how well another pose may explain the same, and how unsure the pose may be (m, rad). In simulated rooms
 #: right ones had 0.33 and less, 9 cm and less; wrong ones, of 5 to 15 s seen by both, 0.6 and more or 15 cm and more.
 _MOST_RIVAL, _UNSURE_M, _UNSURE = 0.6, 0.1, 0.035
@@ -140,10 +142,13 @@ def static_points(sweep: Sweep, ranges: Array) -> Array:
 
 
 def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Say, *, force: bool) -> Fit:
-    """Raises CommandError where nothing fits well enough."""
+    """Raises CommandError where nothing fits well enough, or the laser seems to be mounted the other way up."""
+    points = static_points(recorded.sweep, thinned(recorded, _MOST_STILL).ranges)
     try:
-        fit = fit_walls(static_points(recorded.sweep, thinned(recorded, _MOST_STILL).ranges), outline, recorded.pose)
+        fit = fit_walls(points, outline, recorded.pose)
     except ValueError as error:
+        if _mirrored(points, outline, recorded.pose, None):
+            raise CommandError(f"laser {recorded.name}: {error}; {_OTHER_WAY_UP}") from error
         raise CommandError(f"laser {recorded.name}: {error}") from error
     _tell(recorded.name, recorded.pose, fit.pose, say)
     near, rmse = MATCHED_M * 1000, fit.rmse_m * 1000
@@ -153,12 +158,45 @@ def by_walls(recorded: Recorded, outline: Sequence[tuple[float, float]], say: Sa
     longer, sure = round(100 * (1 / fit.range_scale - 1), 2) + 0.0, 100 * fit.range_scale_sd
     unknown = "" if fit.known_scale is not None else ", which is not sure enough to go by"
     say(f"  it measures {longer:+.2f} % too long (+- {sure:.2f}){unknown}")
-    if (fit.matched < _LEAST_MATCHED or fit.rmse_m > _MOST_RMSE_M) and not force:
+    if force:
+        return fit
+    if _mirrored(points, outline, recorded.pose, fit):
+        raise CommandError(f"laser {recorded.name}: {_OTHER_WAY_UP} (--force keeps it)")
+    if not _fits_well(fit):
         raise CommandError(
             f"laser {recorded.name}: that is no good fit; is the outline right, and the pose by ruler within "
             "half a metre and 20 degrees? --force keeps it"
         )
     return fit
+
+
+_OTHER_WAY_UP = (
+    "were it mounted the other way up, the walls would fit, nearer to the pose by ruler: is upside_down right?"
+)
+
+
+def _fits_well(fit: Fit) -> bool:
+    return fit.matched >= _LEAST_MATCHED and fit.rmse_m <= _MOST_RMSE_M
+
+
+def _mirrored(points: Array, outline: Sequence[tuple[float, float]], pose: Pose, fit: Fit | None) -> bool:
+    """Whether the laser seems to be mounted the other way up: most rooms are not told from their mirror image."""
+    try:
+        other = fit_walls(points * (1.0, -1.0), outline, pose)
+    except ValueError:
+        return False
+    if not _fits_well(other):
+        return False
+    if fit is None or other.matched > fit.matched + _CLEARLY:
+        return True
+    as_well = other.matched > fit.matched - _CLEARLY / 5 and other.rmse_m < fit.rmse_m + 0.001
+    return as_well and _off(other.pose, pose) < _off(fit.pose, pose) / 2
+
+
+def _off(one: Pose, other: Pose) -> float:
+    """How far two poses are from each other (m); a degree counts as 2 cm, what rulers and eyes err by is 5 cm."""
+    turned = abs(math.atan2(math.sin(one[2] - other[2]), math.cos(one[2] - other[2])))
+    return max(0.05, math.dist(one[:2], other[:2]) + 1.15 * turned)
 
 
 def by_walkers(known: Recorded, recorded: Recorded, settings: FloorSettings, say: Say, *, force: bool) -> Registration:

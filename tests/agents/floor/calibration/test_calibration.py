@@ -10,7 +10,7 @@ from floor_rig import DEPTH, OUTLINE, WIDTH, Room, sweep
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tms_agents.floor.calibration.calibrating import by_walkers, static_points
+from tms_agents.floor.calibration.calibrating import by_walkers, by_walls, static_points
 from tms_agents.floor.calibration.walkers import Track, register, walker_tracks
 from tms_agents.floor.recordings.recorded import Recorded, rows_of
 from tms_agents.floor.scan.walls import fit_walls
@@ -66,6 +66,22 @@ def test_people_who_walk_by_do_no_harm():
         seen.append(room.ranges(SWEEP, pose))
     fit = fit_walls(static_points(SWEEP, np.array(seen)), OUTLINE, (2.4, 0.2, 1.5))
     assert math.dist(fit.pose[:2], pose[:2]) < 0.005 and turned(fit.pose[2] - pose[2]) < 0.003
+
+
+@pytest.mark.parametrize("upside_down", [False, True])
+@pytest.mark.parametrize("theta", [1.3, math.pi / 2])
+def test_a_laser_that_is_mounted_the_other_way_up(theta, upside_down):
+    """The walls of a box fit it as well; the ruler tells that its left is its right."""
+    room, pose = Room(1), (1.6, 0.1, theta)
+    seen = looked(room, pose)
+    by_ruler = (pose[0] + 0.03, pose[1] - 0.02, theta + 0.02)
+    rows = rows_of(seen[:, ::-1] if upside_down else seen)
+    recorded, said = Recorded("east", SWEEP, by_ruler, np.arange(len(seen)) / 10, rows), []
+    if not upside_down:
+        assert math.dist(by_walls(recorded, OUTLINE, said.append, force=False).pose[:2], pose[:2]) < 0.01
+        return
+    with pytest.raises(CommandError, match="mounted the other way up"):
+        by_walls(recorded, OUTLINE, said.append, force=False)
 
 
 def test_what_cannot_be_known_is_said():
