@@ -119,7 +119,8 @@ class Outbox:
             await asyncio.sleep(self._save_pause_s)
 
     async def _remembered(self) -> dict[str, Any]:
-        return await _now(self._memory()) | {"told": self._clocks.told}
+        memory: dict[str, Any] = await _now(self._memory())
+        return memory | {"told": self._clocks.told}
 
     def _lost(self) -> None:
         """An event never reached the spool: say what is there instead, until that is taken."""
