@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import os
 from collections.abc import AsyncGenerator, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+log = logging.getLogger(__name__)
 _PERIOD_S = 0.2
 _MAX_VIEWERS = 8
 _MAX_LINE = 1 << 22
@@ -20,7 +22,10 @@ def socket_path(spool: Path) -> Path:
 
 
 async def serve_view(path: Path, view: Callable[[], dict[str, Any]]) -> None:
-    """Serve until cancelled. The caller owns the spool, so a socket that is there already is a dead one."""
+    """Serve until cancelled. The caller owns the spool, so a socket that is there already is a dead one.
+
+    Where there can be no socket (FAT, shares of other computers), that is said, and the agent works without.
+    """
     viewers: set[asyncio.Task[None]] = set()
 
     async def show(writer: asyncio.StreamWriter) -> None:
@@ -40,10 +45,14 @@ async def serve_view(path: Path, view: Callable[[], dict[str, Any]]) -> None:
         viewers.add(task := asyncio.create_task(show(writer)))
         task.add_done_callback(viewers.discard)
 
-    _remove(path)
-    with _short(path) as name:
-        server = await asyncio.start_unix_server(come, name)
-    os.chmod(path, 0o600)  # noqa: PTH101 - one quick call
+    try:
+        _remove(path)
+        with _short(path) as name:
+            server = await asyncio.start_unix_server(come, name)
+        os.chmod(path, 0o600)  # noqa: PTH101 - one quick call
+    except OSError as error:
+        log.warning("%s: %s; nobody can watch this agent", path, error.strerror or error)
+        return
     try:
         await asyncio.Event().wait()
     finally:

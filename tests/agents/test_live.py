@@ -32,6 +32,13 @@ def killed(path: Path) -> None:
         one.bind(str(path))
 
 
+async def test_where_there_can_be_no_socket_the_agent_works_without(tmp_path, caplog):
+    path = tmp_path / "spool.watch"
+    path.mkdir()
+    await asyncio.wait_for(serve_view(path, dict), 10.0)
+    assert caplog.messages == [f"{path}: Is a directory; nobody can watch this agent"]
+
+
 async def test_it_shows_while_it_runs(tmp_path):
     path = tmp_path / "spool.watch"
     assert not await shows(path)
