@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import time
 
 import numpy as np
 import pytest
@@ -74,6 +75,27 @@ async def test_a_walker_who_leaves_a_thing(rig):
     assert mover.label != thing.label
     recorded = read_scans(floor.config.with_name("floor.scans"))
     assert sum(map(len, recorded)) > 100 and recorded[0].name == "laser"
+    assert floor.town.anomalies(floor.name).anomalies == []
+
+
+async def test_a_clock_that_is_set_back(rig):
+    """What is taken afterwards is gone at the server, too, and nothing there is strange."""
+    room, set_s = Room(), [0.0]
+    laser = Laser(room)
+    async with laser.line() as line:
+        floor = rig(scip(line), more=QUICK)
+        async with floor.agent(clock=lambda: time.time() + set_s[0]):
+            await floor.state("connected", "SCIP laser", timeout_s=400.0)
+            await asyncio.sleep(2.0)
+            room.put("thing", *PUT_AT)
+            await floor.count(1)
+            set_s[0] = -3600.0
+            room.take("thing")
+            await floor.count(0)
+            await asyncio.sleep(1.5)  # a heartbeat
+            assert (await floor.view()).state == "connected"
+        view = await floor.view()
+    assert (view.state, view.why) == ("silent", "the agent ended") and view.lag_s < 30.0
     assert floor.town.anomalies(floor.name).anomalies == []
 
 
