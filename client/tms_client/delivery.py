@@ -47,7 +47,7 @@ class Delivery:
         self.trouble: TownError | None = None
         self._pace, self._retry = pace, retry
         self._limit = pace.batch
-        self._agreed = False
+        self._agreed = self._conflict_told = False
         self._api = Api(NO_RETRY)
 
     def drain(self, go_on: Callable[[], bool]) -> Flow[bool]:
@@ -101,6 +101,13 @@ class Delivery:
             return
         if not bad and any(item.where.lstrip("/").startswith(("agent", "room")) for item in refused.items):
             raise refused
+        if isinstance(refused, Conflict) and not self._conflict_told:
+            self._conflict_told = True
+            log.error(
+                "numbers of agent %s are taken by other observations: does another agent run under this name? "
+                "Each needs its own; what is refused is lost",
+                self.spool.agent,
+            )
         for item, reason in bad or [(items[0], str(refused))]:
             log.warning("observation %s/%d refused for good: %s", self.spool.agent, item.seq, reason)
             self.spool.bury(item, reason)

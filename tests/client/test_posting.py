@@ -74,6 +74,17 @@ def test_a_number_the_server_holds_with_another_body_is_a_dead_letter(fake, town
     assert [dead.seq for dead in spool.dead_letters()] == [1]
 
 
+def test_that_another_agent_has_the_name_is_said_once(fake, town, spool, caplog):
+    poster = town.poster(spool, "r", pace=Pace(batch=1))
+    spool.continue_at(0)
+    fake.records |= {("a", n): {"of": "another agent"} for n in range(2)}
+    poster.post(read("A"), read("B"), read("C"))
+    assert poster.drain()
+    said = [one.getMessage() for one in caplog.records if one.levelname == "ERROR"]
+    assert len(said) == 1 and "does another agent run under this name?" in said[0]
+    assert len(spool.dead_letters()) == 2 and tags([fake.records["a", 2]]) == ["C"]
+
+
 def test_a_lost_spool_continues_where_the_server_stands(fake, town, tmp_path):
     for n in range(2):
         with Spool(tmp_path / f"spool{n}", "a") as spool:
