@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import io
 import math
 import os
 import shutil
@@ -37,6 +38,8 @@ def watch(arguments: argparse.Namespace) -> int:
         if not 0 <= getattr(arguments, option) < math.inf:
             raise CommandError(f"--{option} is 0 or more")
     require_place(arguments.png, ".png")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that has no braille still shows the list
     if arguments.scans:
         return _watch_recordings(arguments)
     if arguments.config is None:

@@ -58,6 +58,18 @@ def story_scans(tmp_path_factory):
     return folder
 
 
+def test_watch_where_there_is_no_braille(story_scans):
+    """The list is shown all the same."""
+    command = [sys.executable, "-m", "tms_client", "floor", "watch", "--once", "--wait", "1"]
+    done = subprocess.run(
+        [*command, str(story_scans / "story.scans")],
+        capture_output=True,
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"laser laser: connected" in done.stdout and b"???" in done.stdout
+
+
 def test_replay(story_scans, tmp_path, capsys):
     out, picture = tmp_path / "out.json", tmp_path / "tracks.png"
     scans = [str(story_scans / "story.scans"), "--config", str(story_scans / "floor.toml")]
