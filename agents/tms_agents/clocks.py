@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 log = logging.getLogger(__name__)
 #: A clock that was set back by less is not worth a word.
 _SAID_S = 1.0
+#: Less is how long it takes to look at two clocks; so many times that one was set back count.
+_NOISE_S, _SET_BACK = 1e-3, 20
 
 
 class Clocks:
@@ -35,7 +38,9 @@ class Clocks:
         self._shift = max(unix(), after + 1e-3) - even()
         #: The last time of day that was told, and the sensor time of the clock's last one that was not behind that.
         self._latest, self._in_step = told, self.now()
-        self._behind = False
+        #: The same of every time when the clock was found set back.
+        self._before: deque[tuple[float, float]] = deque(maxlen=_SET_BACK)
+        self._offset, self._behind = unix() - self.now(), False
 
     @classmethod
     def resumed(cls, saved: Mapping[str, Any], unix: Callable[[], float], even: Callable[[], float]) -> Clocks:
@@ -62,8 +67,8 @@ class Clocks:
         for when it was.
         """
         unix, now = self._look()
-        at = unix - (now - t)
-        return datetime.fromtimestamp(max(at, self._latest - max(0.0, self._in_step - t)), UTC)
+        least = [latest - max(0.0, then - t) for latest, then in (*self._before, (self._latest, self._in_step))]
+        return datetime.fromtimestamp(max(unix - (now - t), *least), UTC)
 
     @property
     def told(self) -> float:
@@ -79,15 +84,19 @@ class Clocks:
     def _look(self) -> tuple[float, float]:
         """Unix and sensor time; whether the one is behind what was told."""
         unix, now = self._unix(), self.now()
+        last = (self._latest, self._in_step)
+        if unix - now < self._offset - _NOISE_S and (not self._before or self._before[-1] != last):
+            self._before.append(last)
+        self._offset = unix - now
         if unix >= self._latest:
             self._latest, self._in_step, self._behind = unix, now, False
         elif not self._behind and self._latest - unix > _SAID_S:
             self._behind = True
-            last = datetime.fromtimestamp(self._latest, UTC).isoformat(timespec="seconds")
+            until = datetime.fromtimestamp(self._latest, UTC).isoformat(timespec="seconds")
             log.warning(
                 "the clock of this computer is %.0f s behind what was told already: until it has caught up, "
                 "what happens is told for %s",
                 self._latest - unix,
-                last,
+                until,
             )
         return unix, now

@@ -126,8 +126,11 @@ class Running:
         while True:
             await asyncio.sleep(every_s)
             if (state := self.devices.sum) is not None:
+                self.newest = self.now()
                 with contextlib.suppress(SpoolFull):
-                    await self._poster.post(AgentState(seq=0, observed_at=self.now(), state=state.state, why=state.why))
+                    await self._poster.post(
+                        AgentState(seq=0, observed_at=self.newest, state=state.state, why=state.why)
+                    )
 
 
 @contextlib.asynccontextmanager
