@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from datetime import UTC, datetime
 
 import pytest
 
@@ -19,7 +20,7 @@ COV = (0.01, 0.0, 0.01)
 def belief(events: Sequence[Sequence[FloorEvent]]) -> dict[str, dict[str, float]]:
     """Where cup and plate are after what was told scan by scan; labels: 1 had the cup when they met, 2 the plate."""
     numbers = itertools.count(1)
-    floor = Labels(lambda: f"floor/{next(numbers)}", lambda: 1e6)
+    floor = Labels(lambda: f"floor/{next(numbers)}", lambda t: datetime.fromtimestamp(1e6 + t, UTC))
     entered = [Appeared(1.0, n, "mover", (float(n), 1.0), COV, since=1.0) for n in (1, 2)]
     told: list[Observation] = [one for scan in (entered, *events) for one in floor.observations(scan)]
     movers = [LabelSpec(id=f"floor/{n}", kind="mover", xy=(float(n), 1.0)) for n in (1, 2)]
