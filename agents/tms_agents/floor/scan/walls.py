@@ -135,12 +135,15 @@ class _Walls:
     """The sides of a polygon."""
 
     def __init__(self, outline: Sequence[tuple[float, float]]) -> None:
-        self.start = np.array(outline, dtype=np.float64)
-        along = np.roll(self.start, -1, axis=0) - self.start
+        start = np.array(outline, dtype=np.float64)
+        along = np.roll(start, -1, axis=0) - start
         length = np.hypot(along[:, 0], along[:, 1])
-        if len(outline) < 3 or (length < 1e-6).any():
+        # A corner that is told twice, as the first one is of polygons that are closed, has no side of its own.
+        sides = length >= 1e-6
+        if sides.sum() < 3:
             raise ValueError("the outline needs at least three corners, each somewhere else")
-        self.length, self.along = length, along / length[:, None]
+        self.start, self.length = start[sides], length[sides]
+        self.along = along[sides] / self.length[:, None]
         self.normal = np.stack([-self.along[:, 1], self.along[:, 0]], axis=1)
 
     def nearest(self, points: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -49,6 +49,21 @@ def test_the_walls_tell_how_a_ruler_errs_and_where_the_laser_is(longer: float, o
 
 @pytest.mark.parametrize(
     "outline",
+    [(*OUTLINE, OUTLINE[0]), (OUTLINE[0], *OUTLINE), OUTLINE[::-1]],
+    ids=["closed", "a corner twice", "turned"],
+)
+def test_how_the_outline_is_listed_does_not_count(outline: Sequence[tuple[float, float]]) -> None:
+    pose = (0.05, 0.05, math.pi / 4)
+    seen = points(pose, 1.008)
+    one, other = held_against(seen, OUTLINE, pose), held_against(seen, outline, pose)
+    assert one is not None
+    assert other is not None
+    assert other.pose == pytest.approx(one.pose, abs=1e-9)
+    assert other.range_scale == pytest.approx(one.range_scale, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "outline",
     [
         ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0)),
         ((0.05, 0.05), (4.95, 0.05), (4.95, 3.95), (0.05, 3.95)),
