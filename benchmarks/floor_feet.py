@@ -109,9 +109,11 @@ def _candidate(body: Any, c: Any, cost: Any, since: float, owner: bool) -> Candi
     if not shoe or extra < -1e-6:
         return Candidate(float(cost[which]), 0.0, owner, lands=False, shoe=shoe)
     speed = math.hypot(body["vx"], body["vy"])
-    ux, uy = (body["vx"] / speed, body["vy"] / speed) if speed > 0.05 else (1.0, 0.0)
     ago = body["at"] - since
     x, y = c["x"] - body["x"] + ago * body["vx"], c["y"] - body["y"] + ago * body["vy"]
+    away = max(math.hypot(x, y), 1e-9)
+    # As `landing`: who stands sets off the way to the shoe.
+    ux, uy = (body["vx"] / speed, body["vy"] / speed) if speed > 0.05 else (x / away, y / away)
     step = (c["x"] - ox) * ux + (c["y"] - oy) * uy
     place = (x * ux + y * uy, y * ux - x * uy, step, speed, float(body["pp"]), float(body["stride"]))
     return Candidate(

@@ -38,6 +38,8 @@ _TURNS, _TURNS_M, _TURNS_MORE = 0.22, 0.394, 3.0
 #: The step from the other foot: standard deviation (m) of its length, and the same; of its width (m); what any step is
 #: worth; from this speed (m/s) on it counts wholly.
 _STEP_M, _STEP_MORE, _WIDTH_M, _ANY_STEP, _STEPS = 0.405, 1.41, 1.6, -2.46, 0.35
+#: Who goes slower than this (m/s) has no heading.
+_GOES = 0.05
 #: As the other costs of an assignment count it, a landing without these terms costs this.
 _LEVEL = 6.5
 
@@ -45,8 +47,8 @@ _LEVEL = 6.5
 class Way(NamedTuple):
     """What `lands` needs of a body, whichever shoe and cluster it is: worked out once.
 
-    Its speed (m/s) and heading; variances (m²) of where its shoes land, along and aside and around it, and of the
-    length of its step; the logarithms of what norms them.
+    Its speed (m/s) and heading (0, 0: it stands); variances (m²) of where its shoes land, along and aside and around
+    it, and of the length of its step; the logarithms of what norms them.
     """
 
     speed: float
@@ -65,7 +67,7 @@ class Way(NamedTuple):
 def way(body: Any) -> Way:
     """Of this body."""
     speed = norm(body.vx, body.vy)
-    ux, uy = (body.vx / speed, body.vy / speed) if speed > 0.05 else (1.0, 0.0)
+    ux, uy = (body.vx / speed, body.vy / speed) if speed > _GOES else (0.0, 0.0)
     along, across = _ALONG_M**2 + _ALONG_MORE * body.pp, _ASIDE_M**2 + _ASIDE_MORE * body.pp
     around, lengths = _TURNS_M**2 + _TURNS_MORE * body.pp, _STEP_M**2 + _STEP_MORE * body.pp
     logs = np.log(along * across), np.log(around), np.log(lengths * _WIDTH_M**2)
@@ -86,8 +88,13 @@ def lands(body: Any, goes: Way, c: Any, ox: float, oy: float, seen: float, other
     """As `landing`, of a body whose `way` is known."""
     ago = body.at - since
     x, y = c.x - body.x + ago * body.vx, c.y - body.y + ago * body.vy
-    ahead, aside = x * goes.ux + y * goes.uy, y * goes.ux - x * goes.uy
-    step = (c.x - ox) * goes.ux + (c.y - oy) * goes.uy
+    ux, uy = goes.ux, goes.uy
+    if ux == 0.0 and uy == 0.0:
+        # Who stands may set off any way: the way to this shoe.
+        away = max(norm(x, y), 1e-9)
+        ux, uy = x / away, y / away
+    ahead, aside = x * ux + y * uy, y * ux - x * uy
+    step = (c.x - ox) * ux + (c.y - oy) * uy
     off = ahead - _AHEAD_M - _PER_SPEED * goes.speed + _PER_LAG * (ahead - step)
     goes_on = -0.5 * (off * off / goes.along + aside * aside / goes.across + goes.log_goes_on)
     turns = _TURNS - 0.5 * (ahead * ahead + aside * aside) / goes.around - goes.log_around

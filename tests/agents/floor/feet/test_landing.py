@@ -101,3 +101,13 @@ def test_who_pauses_between_two_ways_sets_off_as_readily_after_nine_seconds_as_a
 def test_who_shows_one_foot_alone_has_not_stood_on_the_other_for_ever() -> None:
     standing = walker(speed=0.0)
     assert price(standing, 0.25, stood=1e9) == price(standing, 0.25, stood=3.0)
+
+
+@given(turn=st.floats(-math.pi, math.pi), ahead=st.floats(-0.6, 0.6), speed=st.floats(0.0, 1.5))
+def test_which_way_the_room_lies_does_not_count(turn: float, ahead: float, speed: float) -> None:
+    """Also of who stands, and so has no heading: it was taken for that of the room's x."""
+
+    def cost(heading: float) -> float:
+        return price(walker(heading, speed), ahead, 0.2, heading)
+
+    assert cost(turn) == pytest.approx(cost(0.0), abs=1e-6)
