@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+#: When what has not happened yet did (s): before every time, also of clocks that begin below zero.
+NEVER = -1e9
+
 #: Something that has stood at one place for a moment: a standing foot, an object not yet believed, a table's leg.
 PRINT = np.dtype(
     [

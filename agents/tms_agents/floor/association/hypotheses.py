@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tms_agents.floor.state import BODY, CERTAIN, FEET, empty
+from tms_agents.floor.state import BODY, CERTAIN, FEET, NEVER, empty
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -39,7 +39,7 @@ def nothing_known(kept: int, most: int, prints: int) -> Hypotheses:
     beliefs[:] = np.eye(most)
     # All fields are as long as an integer: what is the same to the last bit is found by these.
     raw = bodies.view(np.int64).reshape(kept, most, -1)
-    return Hypotheses(bodies, raw, beliefs, np.full((kept, prints), -1e9))
+    return Hypotheses(bodies, raw, beliefs, np.full((kept, prints), NEVER))
 
 
 @njit(cache=True)

@@ -11,6 +11,7 @@ from tms_agents.floor.feet.build import knows_feet, size_up, wears_shoes
 from tms_agents.floor.feet.gait import foot, middle, swap
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.segmentation import DARK, FADES
+from tms_agents.floor.state import NEVER
 
 #: Acceleration noise (m²/s³) and how fast the memory of a velocity fades while nothing is seen (s).
 _ACCELERATION, _COAST_S = 1.5, 2.0
@@ -107,7 +108,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.wide = 1.0 if c.width > WIDE_M else 0.0
     body.far = c.width
     body.ax, body.ay, body.a_seen, body.a_since, body.a_print = c.x, c.y, t, t, print_index
-    body.bx, body.by, body.b_seen, body.b_since, body.b_print = c.x, c.y, -1e9, t, -1
+    body.bx, body.by, body.b_seen, body.b_since, body.b_print = c.x, c.y, NEVER, t, -1
     # What is wide and begins right before the background is a piece of it that is moved.
     body.from_furniture = 1 if c.width > 0.28 and c.gap < 0.35 else 0
     body.clear = 0.0
@@ -115,7 +116,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.quality, body.single = 0.7, 0.0
     body.a_vx, body.a_vy, body.b_vx, body.b_vy, body.a_late, body.b_late = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     body.a_px, body.a_py, body.a_ox, body.a_oy, body.a_land, body.a_stood = c.x, c.y, 1e9, 1e9, t, t
-    body.b_px, body.b_py, body.b_ox, body.b_oy, body.b_land, body.b_stood = 1e9, 1e9, 1e9, 1e9, -1e9, -1e9
+    body.b_px, body.b_py, body.b_ox, body.b_oy, body.b_land, body.b_stood = 1e9, 1e9, 1e9, 1e9, NEVER, NEVER
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
     body.lone_x, body.lone_y = c.x, c.y
     body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
@@ -125,10 +126,10 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.shine, body.shine_n, body.own, body.own_n = 0.0, 0, 0.0, 0
     body.stance, body.stance_n, body.own_stance, body.own_stance_n = 0.0, 0, 0.0, 0
     body.leg_width, body.leg_width_n, body.own_leg_width, body.own_leg_width_n = 0.0, 0, 0.0, 0
-    body.ex, body.ey, body.e_at = 0.0, 0.0, -1e9
+    body.ex, body.ey, body.e_at = 0.0, 0.0, NEVER
     body.shoe_length, body.shoe_length_n, body.own_shoe_length, body.own_shoe_length_n = 0.0, 0, 0.0, 0
-    body.look, body.look_n, body.sure, body.doubted, body.held = 0.0, 0, 1.0, 0, -1e9
-    body.suspected = -1e9
+    body.look, body.look_n, body.sure, body.doubted, body.held = 0.0, 0, 1.0, 0, NEVER
+    body.suspected = NEVER
 
 
 @njit(cache=True)

@@ -14,6 +14,7 @@ from numba import njit
 
 from tms_agents.floor.feet.build import SHOES, beat, from_side
 from tms_agents.floor.norm import norm
+from tms_agents.floor.state import NEVER
 
 #: A foot that moved by so much (m) since the last scan swings; a stance elsewhere than the last (m) is another one.
 _SWING_M, _STANCE_M = 0.05, 0.12
@@ -77,7 +78,7 @@ def foot(body: Any, c: Any, late: float, c_print: int, prints: Any, t: float) ->
         beat(body, body.a_stood - body.a_land, since - body.a_stood)
         body.a_ox, body.a_oy = body.a_px, body.a_py
         body.a_px, body.a_py = c.x, c.y
-        body.a_land = since if t - since < 0.5 or body.a_stood < 0.0 else t
+        body.a_land = since if t - since < 0.5 or body.a_stood <= NEVER else t
     else:
         body.a_px += 0.4 * (c.x - body.a_px)
         body.a_py += 0.4 * (c.y - body.a_py)

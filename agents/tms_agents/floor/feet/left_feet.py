@@ -16,6 +16,7 @@ from tms_agents.floor.feet.brightness import strangeness
 from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.segmentation import CLUSTER
+from tms_agents.floor.state import NEVER
 
 Array = NDArray[np.float64]
 
@@ -146,7 +147,7 @@ def _stand(body: Any, prints: Any, i: int, j: int, t: float) -> None:
     body.x, body.y, body.vx, body.vy = 0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.0, 0.0
     body.pp, body.pv, body.vv = 0.01, 0.0, 0.1
     body.seen, body.clear, body.lone = t, 0.0, 0.0
-    body.held = t + _HELD_S if t - p.rested > _ROOTED_S else -1e9
+    body.held = t + _HELD_S if t - p.rested > _ROOTED_S else NEVER
 
 
 @njit(cache=True)

@@ -20,7 +20,7 @@ from tms_agents.floor.feet.one_foot import FRESH_S, UNLIKELY, Candidate, OneFoot
 from tms_agents.floor.feet.prints import lay_before
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.clustered import ClusteredScan
-from tms_agents.floor.state import SEATED
+from tms_agents.floor.state import NEVER, SEATED
 
 Array = NDArray[np.float64]
 
@@ -191,10 +191,10 @@ def too_wide(body: Any, c: Any) -> float:
 @njit(cache=True)
 def waits(body: Any, c: Any) -> bool:
     """Whether the cluster is where a foot of the body stood when it was lost sight of."""
-    if not body.stale or body.robot or max(body.a_seen, body.b_seen) < 0.0:
+    if not body.stale or body.robot or max(body.a_seen, body.b_seen) <= NEVER:
         return False
-    a = body.a_seen >= 0.0 and norm(c.x - body.ax, c.y - body.ay) < STAND_M
-    return bool(a or (body.b_seen >= 0.0 and norm(c.x - body.bx, c.y - body.by) < STAND_M))
+    a = body.a_seen > NEVER and norm(c.x - body.ax, c.y - body.ay) < STAND_M
+    return bool(a or (body.b_seen > NEVER and norm(c.x - body.bx, c.y - body.by) < STAND_M))
 
 
 @njit(cache=True)

@@ -13,6 +13,7 @@ from tms_agents.floor.feet.build import SHOD, SHOES, joined
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, clear
 from tms_agents.floor.scan.no_echo import blank, silent
+from tms_agents.floor.state import NEVER
 
 Array = NDArray[np.float64]
 
@@ -134,10 +135,10 @@ def follow(
             q = prints[j]
             q.used, q.first, q.rested, q.hits, q.looks, q.mutes, q.whole, q.covered = 1, t, t, 0, 0, 0, 0, 0
             q.x, q.y, q.width, q.spread, q.beams = c.x, c.y, c.width, 0.0, c.n
-            q.last, q.silent, q.hidden = t, -1e9, -1e9
+            q.last, q.silent, q.hidden = t, NEVER, NEVER
             q.still_x, q.still_y, q.still = c.x, c.y, t
             q.attached = c.attached
-            q.owner, q.whose, q.owned, q.busy, q.revealed, q.given = -1, -1, -1e9, -1e9, 0, 0
+            q.owner, q.whose, q.owned, q.busy, q.revealed, q.given = -1, -1, NEVER, NEVER, 0, 0
             q.idle, q.alone = 0.0, 0.0
         q = prints[j]
         off = norm(c.x - q.x, c.y - q.y)
@@ -204,7 +205,7 @@ def follow(
 @njit(cache=True)
 def lay_before(q: Any, body: Any) -> bool:
     """Whether the print was there when the body was found to be nowhere but on what does not move: it is no foot."""
-    nowhere = body.stale and not body.robot and max(body.a_seen, body.b_seen) < 0.0
+    nowhere = body.stale and not body.robot and max(body.a_seen, body.b_seen) <= NEVER
     return bool(nowhere and q.rested < body.seen - _BEFORE_S)
 
 

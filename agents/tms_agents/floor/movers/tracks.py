@@ -42,7 +42,7 @@ from tms_agents.floor.movers.whereabouts import Whereabouts
 from tms_agents.floor.robots.recognizing import may_be_robot
 from tms_agents.floor.scan.freespace import Sight
 from tms_agents.floor.settings import FloorSettings, Scene
-from tms_agents.floor.state import CONCEALED, SEATED
+from tms_agents.floor.state import CONCEALED, NEVER, SEATED
 
 #: How much what is seen next of somebody lost must look like feet.
 _DOUBTED = 0.5
@@ -264,7 +264,7 @@ class Tracks:
             if (new := began(self.bodies, body, thing)) >= 0:
                 return self._merge(index, new, t)
             body["a_print"] = body["b_print"] = -1
-            body["a_seen"] = body["b_seen"] = -1e9
+            body["a_seen"] = body["b_seen"] = NEVER
             body["lone"] = body["wide"] = 0.0
             body["doubted"] = body["both"]
             body["quality"] = max(body["quality"], _DOUBTED)

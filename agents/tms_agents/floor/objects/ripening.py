@@ -13,6 +13,7 @@ from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.feet.prints import HARDLY, lay_before
 from tms_agents.floor.norm import norm
 from tms_agents.floor.objects.patience import SPARE_S, patience
+from tms_agents.floor.state import NEVER
 
 Array = NDArray[np.float64]
 
@@ -160,7 +161,7 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
         if body.used and body.confirmed and body.stale and norm(body.x - q.x, body.y - q.y) < _LOST_M:
             # Who was found to be nowhere but on this is hardly there.
             since = q.rested if lay_before(q, body) else q.first
-            nowhere = max(body.a_seen, body.b_seen) < 0.0 and t - since > _NOWHERE_S
+            nowhere = max(body.a_seen, body.b_seen) <= NEVER and t - since > _NOWHERE_S
             if q.whole < 0.5 * q.hits and not nowhere:
                 return True
     if q.width < _FOOT_M:

@@ -13,6 +13,7 @@ from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.outline import ALL, HIDDEN, ON, fit, quality, share_of
 from tms_agents.floor.scan.segmentation import keep
+from tms_agents.floor.state import NEVER
 
 Array = NDArray[np.float64]
 
@@ -122,7 +123,7 @@ def drive(hypotheses: Any, index: int, q: Any, t: float) -> None:
         body.pp, body.pv, body.vv = _PP, _PV, _VV
         body.at, body.seen = t, t
         body.ax, body.ay, body.a_seen, body.a_print = q.x, q.y, t, -1
-        body.b_seen, body.b_print = -1e9, -1
+        body.b_seen, body.b_print = NEVER, -1
         body.machine, body.robot, body.from_furniture = 1, 1, -1
         body.wide, body.quality = 1.0, 1.0
         body.clear, body.lone, body.single, body.pushed = 0.0, 0.0, 0.0, 0.0
