@@ -153,7 +153,7 @@ class FloorEstimator:
         clusters = self._masks(view.segment(view.ranges, states, view.claimed, *known, view.rays))
         if not view.background.learned:
             clusters = clusters[: backed(clusters)]
-        clusters = clusters[: self._footprints.step(view, clusters, t, lambda: self._pieces(t))]
+        clusters = clusters[: self._footprints.step(view, clusters, t, self._pieces)]
         if self._tracks.flickering.places:
             clusters = clusters[: self._tracks.flickering.step(view, clusters, bodies, t)]
         clusters = clusters[: gather(clusters, bodies, self._robots[1], t)]
@@ -190,22 +190,22 @@ class FloorEstimator:
             dt,
             view.sight,
             self._new_label,
-            lambda body: self._furniture.was(body, float(body["far"]), self._pieces(t)),
-            lambda body: self._furniture.misses(float(body["width"]), float(body["rest_at"]), self._pieces(t)),
+            lambda body: self._furniture.was(body, float(body["far"]), self._pieces()),
+            lambda body: self._furniture.misses(float(body["width"]), float(body["rest_at"]), self._pieces()),
             learned=view.background.learned,
             legs=only_legs(self._shoes),
         )
         appeared: list[FloorEvent] = []
         if view.background.learned:
-            intact = joins(prints, bodies, t) and not self._furniture.lacks(self._pieces(t))
+            intact = joins(prints, bodies, t) and not self._furniture.lacks(self._pieces())
             for index, kind in objects.ripe(prints, bodies, t, scattered, intact):
                 appeared += self._settle(index, kind, t)
         self._association.settle()
         self._protect(view, clusters, of, somebodys)
         return vanished + movers + appeared
 
-    def _pieces(self, t: float) -> list[Piece]:
-        return [piece for view in self._views.values() for piece in self._furniture.pieces(view, t)]
+    def _pieces(self) -> list[Piece]:
+        return [piece for view in self._views.values() for piece in self._furniture.pieces(view)]
 
     def _settle(self, index: int, kind: int, t: float) -> list[FloorEvent]:
         """A print rests: it is an object or furniture, or somebody who is waited for stands on it."""
@@ -220,7 +220,7 @@ class FloorEstimator:
         if kind != OBJECT:
             q["revealed"] = LOOKS
             return []
-        started = min(view.background.seconds for view in self._views.values())
+        started = self._known_s(q)
         known = t - q["first"] > started - self._settings.learn_s
         # Who has stood there all the time was learned with the room, and shows an edge of himself when he shifts.
         edge = q["width"] < _EDGE_M or q["whole"] < 0.8 * q["hits"]
@@ -230,7 +230,7 @@ class FloorEstimator:
             return []
         if back := self._tracks.turns_up(self._prints, index, t):
             return back
-        if known or self._furniture.explains(q, self._prints, self._pieces(t), t, self._empty_until(q, t)):
+        if known or self._furniture.explains(q, self._prints, self._pieces(), t, self._empty_until(q, t)):
             q["revealed"] = MOVED
             return []
         if t - q["silent"] < _MUTE_S and self._dark_width(q) > _DARK_M:
@@ -246,6 +246,14 @@ class FloorEstimator:
         view, beams = self._met(q)
         past = view.background.seen_past(*beams, float(q["near"])) + t - view.background.seconds
         return min(past, float(q["rested"]))
+
+    def _known_s(self, q: Any) -> float:
+        """For how long (s) one of the sensors has looked where the print is: the one that knows the place best.
+
+        Others may be covered, or have begun late: what they have not learned yet is not new.
+        """
+        met, x, y = self._met(q)[0], float(q["x"]), float(q["y"])
+        return max(view.background.seconds for view in self._views.values() if view is met or view.overlooks(x, y))
 
     def _dark_width(self, q: Any) -> float:
         """How wide (m) that is of which the sensor that has met the print last sees a part: black or glossy."""

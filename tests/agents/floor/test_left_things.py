@@ -61,8 +61,8 @@ def face(between: float) -> list[tuple[float, float]]:
     rays[:, 2] = 1.0
     background = Background(n, 0.005, FloorSettings())
     background.centre, background.weight, background.missing = centre, weight, missing
-    view = SimpleNamespace(background=background, rays=rays, step=0.005)
-    return [(round(piece.width, 3), piece.whole) for piece in Furniture().pieces(view, NOW)]
+    view = SimpleNamespace(background=background, rays=rays, step=0.005, last=NOW)
+    return [(round(piece.width, 3), piece.whole) for piece in Furniture().pieces(view)]
 
 
 def test_what_was_moved_from_behind_the_leg_of_a_table_is_one_piece() -> None:

@@ -163,10 +163,13 @@ class Furniture:
         self.legs: list[Leg] = []
         self._rows = np.zeros((128, 5))
 
-    def pieces(self, view: Any, t: float) -> list[Piece]:
+    def pieces(self, view: Any) -> list[Piece]:
         """What has gone from the background of the sensor."""
+        if view.last is None:
+            return []
         b = view.background
-        late = t - b.seconds
+        # Not since the time now: for a sensor that sees nothing any more nothing has gone lately.
+        late = view.last - b.seconds
         count = _pieces(b.centre, b.weight, b.missing, b.gone_at, view.rays, abs(view.step), late, self._rows)
         return [Piece(*row) for row in self._rows[:count].tolist()]
 

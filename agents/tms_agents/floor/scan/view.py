@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.scan.background import Background
-from tms_agents.floor.scan.freespace import Sight
+from tms_agents.floor.scan.freespace import Sight, beam_of
 from tms_agents.floor.scan.rays import rays, views
 from tms_agents.floor.scan.segmentation import Segmenter
 from tms_agents.floor.scan.walls import Fit, held_against
@@ -96,6 +97,15 @@ class View:
             self.ranges *= fit.range_scale
             self.move(fit.pose)
         return fit
+
+    def overlooks(self, x: float, y: float) -> bool:
+        """Whether it would see directly what stands at (x, y) m in the empty room."""
+        dx, dy = x - float(self.pose[0]), y - float(self.pose[1])
+        beam = beam_of(math.atan2(dy, dx) - float(self.pose[2]), self.first, self.step, self.n)
+        if math.isnan(beam):
+            return False
+        far = min(self.background.longest[min(max(round(beam), 0), self.n - 1)], self._reach_m * self.scale)
+        return bool(math.hypot(dx, dy) < far)
 
     def save(self) -> dict[str, Any]:
         """JSON values."""

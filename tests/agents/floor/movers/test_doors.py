@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
+from floor_rooms import Room, sweep
 
+from tms_agents.floor import FloorSettings, Scene, Sensor
+from tms_agents.floor.movers.coverage import Coverage
 from tms_agents.floor.movers.doors import Doors
 from tms_agents.floor.scan.masks import Area
+from tms_agents.floor.scan.view import View
 from tms_agents.floor.state import BODY, empty
 
 GATE = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
@@ -97,3 +102,16 @@ def test_it_outlives_a_restart(doors: Doors) -> None:
     damaged["edges"]["data"] = "AAAA"
     with pytest.raises(ValueError):
         again.restore(damaged)
+
+
+def test_a_laser_that_is_covered_keeps_nobody_from_knowing_what_the_others_see() -> None:
+    sensor = Sensor(sweep(), (0.05, 0.05, math.pi / 4), 1.0)
+    sees, covered = (View(index, sensor, FloorSettings(), ()) for index in range(2))
+    for _, _, ranges in Room().scans(7.0):
+        sees.take(ranges)
+        sees.background.classify(sees.ranges)
+        sees.background.learn(sees.ranges, sees.claimed, 0.1)
+    far = [(7.0, 1.0), (8.0, 1.0), (8.0, 2.0), (7.0, 2.0)]
+    doors = Doors(Area([far]))
+    Coverage(Scene(gates=[far]), doors).look([sees, covered], 10.0, 0.1)
+    assert doors.unseen_m == [pytest.approx(2.0, abs=0.1)]

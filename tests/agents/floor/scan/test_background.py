@@ -76,9 +76,23 @@ def test_a_piece_has_gone_since_its_place_was_free_however_long_it_was_hidden_th
         learned.learn(scan, scan == 1.0, 0.1)
     angles = np.radians(0.5) * np.arange(30)
     rays = np.stack([np.zeros(30), np.zeros(30), np.cos(angles), np.sin(angles)], axis=1)
-    view = SimpleNamespace(background=learned, rays=rays, step=math.radians(0.5))
-    (piece,) = Furniture().pieces(view, 500.0)
+    view = SimpleNamespace(background=learned, rays=rays, step=math.radians(0.5), last=500.0)
+    (piece,) = Furniture().pieces(view)
     assert piece.t == pytest.approx(500.0 - hidden_s - 2.0, abs=0.11)
+
+
+def test_for_a_laser_that_sees_nothing_any_more_nothing_has_gone_lately(learned: Background) -> None:
+    """Else whatever is put near that place would be the piece that had gone before the laser died."""
+    scan = np.full(30, 3.0)
+    scan[12:16] = 4.0
+    learn(learned, scan, 2.0)
+    angles = np.radians(0.5) * np.arange(30)
+    rays = np.stack([np.zeros(30), np.zeros(30), np.cos(angles), np.sin(angles)], axis=1)
+    view = SimpleNamespace(background=learned, rays=rays, step=math.radians(0.5), last=None)
+    assert not Furniture().pieces(view)
+    view.last = learned.seconds
+    (piece,) = Furniture().pieces(view)
+    assert piece.t == pytest.approx(learned.seconds - 2.0, abs=0.11)
 
 
 def test_it_is_known_until_when_the_place_of_something_was_empty(learned: Background) -> None:
