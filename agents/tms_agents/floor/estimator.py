@@ -340,4 +340,7 @@ def _lights(intensities: Array | None, n: int) -> Array:
     """Intensities (n,), or none (0,)."""
     if intensities is None or np.shape(intensities) != (n,):
         return _DARK
-    return np.asarray(intensities, dtype=np.float64)
+    lights = np.asarray(intensities, dtype=np.float64)
+    back = lights[lights > 0.0]
+    # Where a laser tells none, some drivers give every echo the same: that is no brightness.
+    return lights if back.size and back.min() < back.max() else _DARK
