@@ -205,7 +205,9 @@ class FloorEstimator:
         return vanished + movers + appeared
 
     def _pieces(self) -> list[Piece]:
-        return [piece for view in self._views.values() for piece in self._furniture.pieces(view)]
+        # Of the room that a laser has not learned yet whoever stood there has gone, and explains what was put down.
+        learned = [view for view in self._views.values() if view.background.learned]
+        return [piece for view in learned or self._views.values() for piece in self._furniture.pieces(view)]
 
     def _settle(self, index: int, kind: int, t: float) -> list[FloorEvent]:
         """A print rests: it is an object or furniture, or somebody who is waited for stands on it."""

@@ -138,3 +138,18 @@ def test_beside_a_laser_that_never_sees_anything(told, second: bool) -> None:
         events += estimator.scan(name, t, ranges)
         labels.append(tuple(estimator.labels()))
     same(told, (labels, events), lambda x, y: (x, y))
+
+
+def test_beside_a_laser_that_begins_late() -> None:
+    """It takes who stands there for a part of the room; that has gone then, but is not what somebody put down."""
+    stands = [(7.0, 4.8, 2.0), (9.5, 2.2, 2.0), (13.0, 2.2, 2.0), (14.5, 2.2, 0.8), (19.0, 2.2, 0.8)]
+    seen = list(Room(together(walker(stands), thing(1.9, 1.9, 0.05, 13.5))).scans(19.0))
+    for begins in (9.6, 30.0):
+        estimator = FloorEstimator({"A": LASER, "B": LASER}, scene=scene())
+        for _, t, ranges in seen:
+            estimator.scan("A", t, ranges)
+            if t > begins:
+                estimator.scan("B", t, ranges)
+            if t < 15.5:
+                told = [label.xy for label in estimator.labels() if label.kind == "object"]
+        assert told == [pytest.approx((1.9, 1.9), abs=0.03)], begins
