@@ -7,9 +7,9 @@ import pytest
 from floor_prints import shows
 
 from tms_agents.floor.feet.clutter import costs, goes_on
-from tms_agents.floor.feet.likelihood import feet
+from tms_agents.floor.feet.likelihood import feet, waits
 from tms_agents.floor.scan.segmentation import CLUSTER, FADES
-from tms_agents.floor.state import BODY, PRINT, empty
+from tms_agents.floor.state import BODY, CONCEALED, NEVER, PRINT, empty
 
 BEHIND_SOMETHING_NEW = 2
 
@@ -133,3 +133,10 @@ def test_whoever_came_unknown_is_paid_for_once(shoe: float, since: float, nobody
     cost = np.full((1, 1), 11.0)
     goes_on(shows(clusters, prints, 5.0, 0), bodies, np.array([nobodys_at]), cost)
     assert bool(cost[0, 0] < 11.0) == costs_less
+
+
+@pytest.mark.parametrize(("seen", "expected"), [(100.0, True), (0.0, True), (-100.0, True), (NEVER, False)])
+def test_where_a_foot_was_seen_last_its_owner_waits_whatever_time_it_was(seen: float, expected: bool) -> None:
+    body, cluster = empty(BODY, 1)[0], np.zeros(1, CLUSTER)[0]
+    body["used"], body["stale"], body["a_seen"], body["b_seen"] = 1, CONCEALED, seen, NEVER
+    assert waits(body, cluster) == expected
