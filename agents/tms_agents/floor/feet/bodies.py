@@ -25,6 +25,9 @@ WIDE_M = 0.4
 _SEEN_S, _JUST_S = 0.25, 1.5
 #: Of whom two feet were seen at once in this share of so many scans is no robot.
 _TWO_FEET, _PERSON_HITS = 0.2, 80
+#: As furniture looks who was too wide for feet in such a share of late: more than makes a robot (`recognize`), which is
+#: looked for first.
+_FURNITURE = 0.65
 
 
 @njit(cache=True)
@@ -136,7 +139,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
 def misled(body: Any) -> bool:
     """Whether what is taken for a person has become as wide as furniture."""
     two_feet = body.both > _TWO_FEET * body.hits
-    return bool(not body.robot and body.wide > 0.5 and body.hits > _PERSON_HITS and two_feet)
+    return bool(not body.robot and body.wide > _FURNITURE and body.hits > _PERSON_HITS and two_feet)
 
 
 @njit(cache=True)

@@ -106,7 +106,8 @@ def _is_parked(body: Any, t: float, legs: bool) -> bool:
         return False
     since = body.a_since if body.a_seen >= body.b_seen else body.b_since
     if body.wide > 0.5:
-        return bool(t - since > _PARKED_S)
+        # What is wide goes without landing anew.
+        return bool(t - max(since, body.rest_at) > _PARKED_S)
     if legs and body.width > _SIDE_BY_SIDE_M and t - body.rest_at > 2.0 * _PARKED_S:
         return True
     inert = t - body.rest_at > _INERT_S and not body.robot and not has_come(body)

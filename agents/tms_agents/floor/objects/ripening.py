@@ -32,8 +32,9 @@ _MUTES, _SELDOM = 10, 0.06
 _LOST_M, _STANDS_S, _PAIR_M, _TOGETHER_S = 0.35, 25.0, 0.45, 2.0
 #: The same of somebody of whom one thing alone was seen that did not move.
 _NOWHERE_S = 8.0
-#: No foot looks narrower (m); as wide as this (m) is a shoe from its side.
-_FOOT_M, _SHOE_M = 0.06, 0.2
+#: No foot looks narrower (m); as wide as this (m) is a shoe from its side. Whoever had it for a foot was there so
+#: lately (s), or it was none.
+_FOOT_M, _SHOE_M, _NEARBY_S = 0.06, 0.2, 10.0
 #: Whoever is there, what is so broad (m) is furniture, where there are no robots.
 _BROAD_M = 0.45
 #: Robots stand for so long (s); what stands behind something is seen in part in this share of its sightings.
@@ -154,7 +155,8 @@ def _somebodys(q: Any, prints: Any, j: int, bodies: Any, t: float) -> bool:
         return True
     if t - q.first > _STANDS_S:
         return False
-    if q.width > _SHOE_M and (t - q.first < _PART_S or q.owned >= q.first):
+    his = q.owned >= q.first and t - q.busy < _NEARBY_S
+    if q.width > _SHOE_M and (t - q.first < _PART_S or his):
         return True
     for b in range(bodies.size):
         body = bodies[b]

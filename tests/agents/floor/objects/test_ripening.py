@@ -87,6 +87,15 @@ def test_what_lay_there_beside_two_feet_is_told_though_it_is_hidden_when_he_has_
     assert told(resting(4.0, **({"last": NOW - 1.0, "hidden": NOW, "spare": 0.5, "busy": NOW - 2.5} | fields))) == known
 
 
+@pytest.mark.parametrize(("owned_s", "busy_s", "known"), [(15.0, 14.0, True), (15.0, 8.0, False), (40.0, 8.0, True)])
+def test_what_is_wide_and_was_taken_for_a_foot_is_none_when_nobody_has_been_near_for_long(
+    owned_s: float, busy_s: float, known: bool
+) -> None:
+    """It has been there for 20 s; what it was before that does not matter."""
+    bin_ = resting(20.0, width=0.25, owned=NOW - owned_s, busy=NOW - busy_s)
+    assert told(bin_) == known
+
+
 def test_what_is_hidden_is_not_learned_as_a_part_of_the_wall_until_it_is_seen_again() -> None:
     before = {"attached": 0.95, "spare": 0.5, "busy": NOW - 8.0}
     assert not told(resting(12.0, last=NOW - 1.0, hidden=NOW, **before), FURNITURE)
