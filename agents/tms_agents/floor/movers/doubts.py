@@ -22,6 +22,7 @@ from tms_agents.floor.events import Confused, FloorEvent, Vanished
 from tms_agents.floor.feet.build import SHOES
 from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.norm import norm
+from tms_agents.floor.state import NEVER
 
 Array = NDArray[np.float64]
 
@@ -66,7 +67,7 @@ class Doubts:
     def __init__(self, most: int) -> None:
         self._doubts: dict[tuple[int, int], _Doubt] = {}
         self._pairs = np.zeros(most * (most - 1) // 2, _PAIR)
-        self._looked = -math.inf
+        self._looked = NEVER
 
     def look(self, bodies: Any, belief: Array, scattered: Array, t: float) -> list[Confused]:
         """Who is near whom, and who may be whom; what is due to be told."""
@@ -94,10 +95,16 @@ class Doubts:
         return [one for pair in due for one in self._judge(pair, t)]
 
     def given_back(self, exchanges: Sequence[tuple[int, int]], t: float) -> list[Confused]:
-        """These labels are exchanged now, one pair after the other, because who has them had been."""
+        """These labels are exchanged now, one pair after the other, because who has them had been.
+
+        Whom else they met they met under the labels they had.
+        """
         found: list[Confused] = []
         for one, other in exchanges:
             pair = (min(one, other), max(one, other))
+            for also, doubt in self._doubts.items():
+                if doubt.waits and also != pair and {one, other} & {*also}:
+                    found += self._judge(also, t)
             doubt = self._doubts.setdefault(pair, _Doubt(since=t))
             doubt.p = min(max(doubt.p, _GIVEN_BACK[0]), _GIVEN_BACK[1])
             doubt.alike = False
@@ -116,17 +123,19 @@ class Doubts:
                     del self._doubts[pair]
         return found
 
-    def save(self) -> list[list[Any]]:
+    def save(self) -> dict[str, Any]:
         """JSON values."""
-        return [[*pair, *(None if one == math.inf else one for one in astuple(doubt))]
-                for pair, doubt in self._doubts.items()]  # fmt: skip
+        doubts = [[*pair, *(None if one == math.inf else one for one in astuple(doubt))]
+                  for pair, doubt in self._doubts.items()]  # fmt: skip
+        return {"looked": self._looked, "doubts": doubts}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
+        self._looked = float(saved["looked"])
         self._doubts = {
             (int(a), int(b)): _Doubt(float(since), math.inf if apart is None else float(apart), float(p), float(told),
                                      bool(waits), bool(parted), bool(alike))
-            for a, b, since, apart, p, told, waits, parted, alike in saved
+            for a, b, since, apart, p, told, waits, parted, alike in saved["doubts"]
         }  # fmt: skip
 
     def _judge(self, pair: tuple[int, int], t: float) -> list[Confused]:

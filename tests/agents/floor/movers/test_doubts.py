@@ -161,7 +161,7 @@ def test_of_who_leaves_it_is_told_before_unless_he_was_somebody_else(into: int |
     told = doubts.gone(events, MET + 5.0)
     assert [(one.p, one.since) for one in told] == ([] if into else [(pytest.approx(0.3), MET)])
     assert doubts.gone(events, MET + 5.0) == []
-    assert doubts.save() == []
+    assert doubts.save()["doubts"] == []
 
 
 def test_it_goes_on_as_it_was_saved() -> None:
@@ -170,10 +170,25 @@ def test_it_goes_on_as_it_was_saved() -> None:
     later(doubts, doubt(0.3), MET + 3.0, MET + 30.0)
     meet(doubts, 2 * MET)
     again.restore(json.loads(json.dumps(doubts.save())))
+    assert again.save() == doubts.save()
     assert later(again, doubt(0.45), 2 * MET + 3.0, 3 * MET) == later(doubts, doubt(0.45), 2 * MET + 3.0, 3 * MET) != []
 
 
-@pytest.mark.parametrize("saved", [None, [[1, 2]], [[1, 2, "x", None, 0.0, 0.0, False]]])
+def test_whom_else_they_met_is_told_before_their_labels_change() -> None:
+    doubts, bodies = Doubts(3), people(0.6)
+    bodies["x"][2] = 0.8
+    assert doubts.look(bodies, doubt(0.3), expected(), MET) == []
+    belief = np.array([[0.5, 0.3, 0.2], [0.3, 0.7, 0.0], [0.2, 0.0, 0.8]])
+    assert doubts.look(people(), belief, expected(), MET + 1.0) == []
+    told = doubts.given_back([(7, 4)], MET + 1.5)
+    assert [(one.label, one.other, one.p) for one in told] == [
+        (7, 9, pytest.approx(0.4 / 1.7, abs=1e-4)),
+        (4, 7, 0.5),
+        (4, 7, 1.0),
+    ]
+
+
+@pytest.mark.parametrize("saved", [None, {"looked": 1.0}, {"looked": 1.0, "doubts": [[1, 2]]}, {"looked": "x"}])
 def test_what_was_not_saved_is_refused(saved: Any) -> None:
-    with pytest.raises((TypeError, ValueError)):
+    with pytest.raises((KeyError, TypeError, ValueError)):
         Doubts(3).restore(saved)
