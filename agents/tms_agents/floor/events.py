@@ -89,8 +89,8 @@ class Back:
 class Confused:
     """Two movers who met were taken for each other with probability ``p``: since then each has what the other had.
 
-    They were nearest ``since``; what was told before of where each is stands. 1: from now on their labels are
-    exchanged, to give back to each his own.
+    They were nearest ``since``; what was told before of where each is stands. ``since`` now, and 1: from now on their
+    labels are exchanged, to give back to each his own.
     """
 
     t: float

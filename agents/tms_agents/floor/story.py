@@ -19,7 +19,7 @@ def told(event: FloorEvent) -> str | None:
         return f"mover #{event.label} is out of sight"
     if isinstance(event, Back):
         return f"mover #{event.label} is back at ({event.xy[0]:.2f}, {event.xy[1]:.2f})"
-    if isinstance(event, Confused) and event.p < 1.0:
+    if isinstance(event, Confused) and event.since < event.t:
         return f"movers #{event.label} and #{event.other} may have been exchanged ({event.p:.0%})"
     return None
 
