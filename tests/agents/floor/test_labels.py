@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from tms_agents.floor import Appeared, Back, Confused, FloorLabel, Moved, Vanished
 from tms_agents.floor.labels import Labels
+from tms_agents.floor.story import told
 from tms_schemas.events import Near
 from tms_schemas.observation import (
     LabelAppeared,
@@ -169,6 +170,12 @@ def test_who_may_have_been_exchanged_is_told_for_when_they_met():
     assert at(late) > 33.0
     floor.observations([mover(40.0, 4, robot=True)])
     assert floor.observations([Confused(41.0, 3, 4, 0.2, 40.5), Confused(41.0, 3, 9, 0.2, 40.5)]) == []
+
+
+@pytest.mark.parametrize(("p", "since", "line"), [(0.3, 20.0, "30%"), (1.0, 20.0, "100%"), (1.0, 30.0, None)])
+def test_people_read_who_may_have_been_exchanged_not_that_labels_are_given_back(p, since, line):
+    found = told(Confused(30.0, 1, 2, p, since))
+    assert found == (None if line is None else f"movers #1 and #2 may have been exchanged ({line})")
 
 
 def test_robots_report_themselves_and_are_named_by_where_they_were():
