@@ -69,7 +69,7 @@ def record(arguments: argparse.Namespace) -> int:
     if arguments.seconds is not None and not 0.5 <= arguments.seconds < math.inf:
         raise CommandError("--seconds is 0.5 or more")
     try:
-        writer = ScanWriter(arguments.out)
+        writer = ScanWriter(arguments.out, config.upside_down)
     except (OSError, ValueError) as error:
         raise CommandError(f"{arguments.out}: {getattr(error, 'strerror', None) or error}") from error
     if words := writer.damage.in_words():

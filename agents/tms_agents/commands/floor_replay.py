@@ -17,7 +17,7 @@ from tms_agents.config import faults_of, read_config
 from tms_agents.floor.calibration.poses import calibrated
 from tms_agents.floor.config import FloorConfig
 from tms_agents.floor.recordings.formats import read_scans
-from tms_agents.floor.recordings.recorded import Recorded, within
+from tms_agents.floor.recordings.recorded import Recorded, mounted, within
 from tms_agents.floor.recordings.replay import Replay, Tracks
 from tms_agents.floor.settings import Pose
 from tms_agents.floor.watch.picture import tracks_png
@@ -63,7 +63,9 @@ def recordings_of(arguments: argparse.Namespace) -> tuple[FloorConfig, list[Reco
         while name in [other.name for other in recordings]:
             name, count = f"{one.name} {count}", count + 1
         pose, laser = poses.get(one.name, one.pose), lasers.get(one.name)
-        one = one if laser is None else changed(within(one, laser.range_max_m), range_scale=laser.range_scale)
+        if laser is not None:
+            one = within(mounted(one, upside_down=laser.upside_down), laser.range_max_m)
+            one = changed(one, range_scale=laser.range_scale)
         recordings.append(changed(one, name=name, pose=pose))
     if arguments.pose:
         given = [_pose(text) for text in arguments.pose]

@@ -153,6 +153,11 @@ class FloorConfig(AgentConfig):
         return FloorSettings(**tuned)
 
     @property
+    def upside_down(self) -> frozenset[str]:
+        """The lasers that are mounted so."""
+        return frozenset(one.name for one in self.lasers if one.upside_down)
+
+    @property
     def tells_robots(self) -> bool:
         return any(robot.report for robot in self.robots)
 

@@ -149,7 +149,7 @@ class _Work:
             worth_saving=lambda batch: any(not isinstance(one, LabelMoved) for one in batch),
         )
         self._mind = Understanding(floor, clocks, self._outbox.post)
-        self._recorder = None if config.recording is None else Recorder(config.recording)
+        self._recorder = None if config.recording is None else Recorder(config.recording, config.upside_down)
         if self._recorder is not None:
             floor.hear = self._recorder.hear
 

@@ -15,10 +15,10 @@ from tms_agents.clocks import Clocks
 from tms_agents.devices.scans import Array, Scan, Sweep
 from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.calibration.walkers import Registration, register, walker_tracks
-from tms_agents.floor.config import FloorConfig
+from tms_agents.floor.config import FloorConfig, LaserSection
 from tms_agents.floor.lasers import Laser
 from tms_agents.floor.recordings.formats import Say, read_scans
-from tms_agents.floor.recordings.recorded import Recorded, forward, thinned, within
+from tms_agents.floor.recordings.recorded import Recorded, forward, mounted, thinned, within
 from tms_agents.floor.runner import listen
 from tms_agents.floor.scan.walls import MATCHED_M, Fit, fit_walls
 from tms_agents.floor.settings import FloorSettings, Pose
@@ -97,9 +97,13 @@ def from_files(paths: Sequence[Path], config: FloorConfig, names: Sequence[str],
         raise CommandError(f"the recordings hold {', '.join(sorted(by_name))}, wanted are {', '.join(names)}")
     lasers = {one.name: one for one in config.lasers}
     return [
-        replace(within(one, lasers[name].range_max_m), name=name, pose=lasers[name].pose.pose)
+        replace(_as_configured(one, lasers[name]), name=name, pose=lasers[name].pose.pose)
         for name, one in zip(names, chosen, strict=True)
     ]
+
+
+def _as_configured(one: Recorded, laser: LaserSection) -> Recorded:
+    return within(mounted(one, upside_down=laser.upside_down), laser.range_max_m)
 
 
 def outline_of(config: FloorConfig, given: str | None) -> list[tuple[float, float]]:
@@ -239,4 +243,4 @@ def _recorded(name: str, pose: Pose, scans: Sequence[tuple[float, Scan]]) -> Rec
     sweep = scans[-1][1].sweep
     same = [(t, scan) for t, scan in scans if scan.sweep is sweep]
     t, rows = np.array([t for t, _ in same]), [(scan.ranges, scan.intensities) for _, scan in same]
-    return forward(Recorded(name, sweep, pose, t, rows))
+    return forward(Recorded(name, sweep, pose, t, rows, upside_down=None))  # mounted already

@@ -37,7 +37,9 @@ def read_recording(path: Path, damage: Damage) -> list[Recorded]:
             if record.kind == b"S":
                 told = json.loads(zlib.decompress(record.body))
                 number = told.pop("sensor")
+                upside_down = told.pop("upside_down", None)  # older recordings do not tell
                 described = by_number[number] = sensors.setdefault(json.dumps(told), _Blocks(source, told))
+                described.upside_down = described.upside_down if upside_down is None else bool(upside_down)
                 for block in undescribed.pop(number, ()):
                     described.add(block)
                 continue
@@ -83,6 +85,7 @@ class _Blocks:
     def __init__(self, source: _Source, told: dict[str, Any]) -> None:
         self._source, self._told = source, told
         self._blocks: list[_Block] = []
+        self.upside_down: bool | None = None
         #: The number of the first scan of each block, and of the one after the last.
         self._firsts = [0]
         self._decoded: tuple[int, Array, Array | None] | None = None
@@ -96,7 +99,8 @@ class _Blocks:
     def recorded(self) -> Recorded:
         x, y, theta = self._told["pose"]
         t = np.concatenate([block.times for block in self._blocks])
-        return Recorded(self._told["name"], Sweep.from_json(self._told), (x, y, theta), t, self)
+        sweep = Sweep.from_json(self._told)
+        return Recorded(self._told["name"], sweep, (x, y, theta), t, self, upside_down=self.upside_down)
 
     def __len__(self) -> int:
         return self._firsts[-1]

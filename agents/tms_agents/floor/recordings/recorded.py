@@ -35,7 +35,8 @@ class Recorded:
     """Scans of one sensor: ``t`` (T,) s of the first beams, and what was measured.
 
     ``pose`` is that of the sensor in the room: x, y in metres, yaw in radians; ``range_scale``: what it measures times
-    this is how far it is, if that is known.
+    this is how far it is, if that is known. ``upside_down``: its angles are those of a laser with its top to the floor,
+    told as seen from above; False as the device itself tells them, None where that was not written down.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Recorded:
     t: Array
     rows: Rows
     range_scale: float | None = None
+    upside_down: bool | None = False
 
     def __len__(self) -> int:
         return len(self.t)
@@ -103,6 +105,13 @@ def within(one: Recorded, reach_m: float | None) -> Recorded:
     if reach_m is None or reach_m >= one.sweep.range_max_m:
         return one
     return replace(one, sweep=replace(one.sweep, range_max_m=reach_m))
+
+
+def mounted(one: Recorded, *, upside_down: bool) -> Recorded:
+    """As of a laser that hangs so. Of what was not written down it is believed that it was told as it hung."""
+    if one.upside_down is None or one.upside_down == upside_down:
+        return one
+    return replace(one, sweep=replace(one.sweep, angles=-one.sweep.angles), upside_down=upside_down)
 
 
 def thinned(one: Recorded, most: int) -> Recorded:

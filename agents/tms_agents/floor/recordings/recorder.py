@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Collection
 from concurrent.futures import ThreadPoolExecutor
 
 from tms_agents.devices.scans import Scan
@@ -21,7 +22,8 @@ _SAY_S = 60.0
 class Recorder:
     """Trouble with the disk is said once; a minute later it is tried again."""
 
-    def __init__(self, section: RecordingSection) -> None:
+    def __init__(self, section: RecordingSection, upside_down: Collection[str] = ()) -> None:
+        self._upside_down = upside_down
         self._path, self._most_bytes = section.path, int(section.max_mb * 1e6)
         self._thread = ThreadPoolExecutor(1, "recorder")
         self._waiting = 0
@@ -59,7 +61,7 @@ class Recorder:
                 self._writer = None
                 self._path.replace(self._path.with_name(self._path.name + ".old"))
             if self._writer is None:
-                self._writer = ScanWriter(self._path)
+                self._writer = ScanWriter(self._path, self._upside_down)
                 if words := self._writer.damage.in_words():
                     log.warning("recording %s: %s", self._path, words)
             self._writer.add(laser, pose, t, scan)

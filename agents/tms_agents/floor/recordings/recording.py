@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import zlib
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -45,11 +46,13 @@ class _Described:
 class ScanWriter:
     """Appends to a recording; scans of the last second are lost with the power, all before are on the disk.
 
+    ``upside_down``: the lasers whose scans come as of a laser with its top to the floor, told as seen from above.
+
     Raises (also later): OSError where the disk refuses; ValueError where ``path`` is something else.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, upside_down: Collection[str] = ()) -> None:
+        self.path, self._upside_down = path, upside_down
         #: What of the file that was there cannot be read.
         self.damage = Damage()
         self._file = path.open("ab+", buffering=0)
@@ -109,6 +112,7 @@ class ScanWriter:
         unit = 0.001 * max(1, int(np.ceil(reach * 1000 / MOST_UNITS)))
         number, self._next = self._next, self._next + 1
         told = {"sensor": number, "name": sensor, "pose": list(pose), "unit_m": unit, **sweep.to_json()}
+        told["upside_down"] = sensor in self._upside_down
         told["angles"] = [round(angle, 9) for angle in told["angles"]]
         known = _Described(sweep, pose, number, unit, zlib.compress(json.dumps(told).encode()), t)
         self._described[sensor] = known
