@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -80,7 +80,7 @@ def read_config(path: Path, model: type[C]) -> C:
 
 def faults_of(error: ValidationError) -> str:
     """What is wrong, and where, in one line."""
-    return "; ".join(_in_words(one["loc"], one["msg"]) for one in error.errors(include_url=False)[:5])
+    return "; ".join(_in_words(one["loc"], _brackets(one) or one["msg"]) for one in error.errors(include_url=False)[:5])
 
 
 def misplaced(place: Sequence[str | int], why: str) -> ValidationError:
@@ -100,6 +100,18 @@ def need_names_of_their_own(what: str, names: Sequence[str]) -> None:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise misplaced((number, "name"), f"two {what}s are called {name!r}: give each its name")
+
+
+def _brackets(one: Mapping[str, Any]) -> str:
+    """[lasers] for [[lasers]], or the other way round: that a list is wanted says little to who writes a file."""
+    if len(one["loc"]) != 1:
+        return ""
+    (name,), given = one["loc"], one["input"]
+    if one["type"] == "list_type" and isinstance(given, dict):
+        return f"this section is given once for each: write [[{name}]], with two brackets"
+    if one["type"] == "model_type" and isinstance(given, list) and given and isinstance(given[0], dict):
+        return f"there is one such section: write [{name}], with one bracket"
+    return ""
 
 
 def _in_words(place: Sequence[str | int], what: str) -> str:

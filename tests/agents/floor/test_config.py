@@ -108,6 +108,16 @@ def test_there_is_an_example_for_each_device_and_each_part_of_a_room():
             ": scene.seats: a list of seats is wanted, this is a single one: put [ ] around it",
         ),
         (("[scene]", "[scene]\nmirrors = [[1, 1], [2, 1]]"), "a list of mirrors is wanted"),
+        (
+            ("[[lasers]]", "[lasers]"),
+            ": lasers: this section is given once for each: write [[lasers]], with two",
+        ),
+        (
+            ("[scene]", "[robots]\nwidth = 1\nlength = 1\n[scene]"),
+            ": robots: this section is given once for each: write",
+        ),
+        (("[scene]", "[[scene]]"), ": scene: there is one such section: write [scene], with one bracket\n"),
+        (("[spool]", "[[spool]]"), ": spool: there is one such section: write [spool], with one bracket\n"),
         (("[scene]", "[[robots]]\nwidth = 45\nlength = 45\n[scene]"), "robots.0.width: Input should be less than or"),
     ],
 )
