@@ -43,7 +43,11 @@ class Floor:
         saved: Mapping[str, Any] | None = None,
     ) -> None:
         self.config, self._clocks = config, clocks
-        self.lasers = {one.name: Laser(one, poses.get(one.name), after=clocks.now()) for one in config.lasers}
+        # What a mirror shows of the region is not looked for.
+        region = None if config.scene.mirrors else config.scene.region
+        self.lasers = {
+            one.name: Laser(one, poses.get(one.name), after=clocks.now(), region=region) for one in config.lasers
+        }
         self.labels = Labels(
             new_label,
             clocks.in_step,

@@ -9,8 +9,9 @@ import numpy as np
 from tms_agents.devices.scans import Array, Scan, Sweep
 from tms_agents.devices.transport import DeviceState
 from tms_agents.floor.config import LaserSection
+from tms_agents.floor.outlook import Outlook
 from tms_agents.floor.recordings.clock import ScanTimes
-from tms_agents.floor.settings import Pose, Sensor
+from tms_agents.floor.settings import Polygon, Pose, Sensor
 
 #: Blind or stuck for so long is a fault; a hand that passes the window is none.
 _FAULT_S = 2.0
@@ -18,9 +19,19 @@ _NEAR_M, _BLIND_SHARE, _ERROR_SHARE = 0.15, 0.5, 0.9
 
 
 class Laser:
-    """``pose`` as calibrated, or as the configuration says. No scan is from before ``after``."""
+    """``pose`` as calibrated, or as the configuration says. No scan is from before ``after``.
 
-    def __init__(self, section: LaserSection, pose: Pose | None = None, *, after: float = float("-inf")) -> None:
+    ``region``: where labels are wanted, if it is to see some of it.
+    """
+
+    def __init__(
+        self,
+        section: LaserSection,
+        pose: Pose | None = None,
+        *,
+        after: float = float("-inf"),
+        region: Polygon | None = None,
+    ) -> None:
         self.section = section
         self.pose = pose or section.pose.pose
         self.times = ScanTimes(after)
@@ -32,6 +43,7 @@ class Laser:
         self._trouble = ""
         self._well_at: float | None = None
         self._own: tuple[Sweep, Sweep] | None = None
+        self._outlook = None if region is None else Outlook(region, self.pose)
 
     def line(self, state: DeviceState) -> None:
         self._line = DeviceState(state.state, f"{self.section.name}: {state.why}")
@@ -45,6 +57,14 @@ class Laser:
             return DeviceState("faulty", f"{self.section.name}: {self._trouble}")
         return self._line
 
+    def _looks(self, scan: Scan) -> str:
+        """Who stands before it is no reason, nor is who passes one: one beam that gets there is enough, once."""
+        if self._outlook is not None:
+            self._outlook.look(scan.sweep, scan.ranges)
+            if not self._outlook.sees:
+                return _ELSEWHERE
+        return ""
+
     def mounted(self, scan: Scan) -> Scan:
         """The scan as of a laser the right way up, with the reach that is wanted; its sweep stays the same object."""
         if self._own is None or not same_sweep(self._own[0], scan.sweep):
@@ -57,7 +77,7 @@ class Laser:
 
     def usable(self, t: float, scan: Scan) -> bool:
         """Whether the scan says anything about the room; where not for long, ``state`` says why not."""
-        trouble = self._judge(scan)
+        trouble = self._judge(scan) or self._looks(scan)
         self.sweep, self.ranges = scan.sweep, scan.ranges
         self.scans += 1
         if not trouble or self._well_at is None:
@@ -65,7 +85,7 @@ class Laser:
         # A scan that is the same as the one before says the same; only at length it is strange.
         late = t - self._well_at >= _FAULT_S
         self._trouble = trouble if late else ""
-        return not trouble or (trouble == _STUCK and not late)
+        return trouble in ("", _ELSEWHERE) or (trouble == _STUCK and not late)
 
     def _judge(self, scan: Scan) -> str:
         ranges = scan.ranges
@@ -86,6 +106,7 @@ class Laser:
 
 
 _STUCK = "it repeats one scan"
+_ELSEWHERE = "it sees nothing of the region: is its pose right, and [scene] region?"
 
 
 def same_sweep(one: Sweep, other: Sweep) -> bool:
