@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from sqlalchemy.ext.asyncio import AsyncEngine
 
 from tms_server import apidocs, health, problems
+from tms_server.agents.disputes import Disputes
 from tms_server.agents.endpoints import router as agents_router
 from tms_server.clock import Clock, SystemClock
 from tms_server.db.engine import create_engine
@@ -44,6 +45,7 @@ class State(TypedDict):
     keys: KeyRing
     town: Town
     feeds: Feeds
+    disputes: Disputes
 
 
 def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
@@ -68,6 +70,7 @@ def create_app(settings: Settings, *, clock: Clock | None = None) -> FastAPI:
                         keys=KeyRing(sessions),
                         town=town,
                         feeds=Feeds(town),
+                        disputes=Disputes(),
                     )
         finally:
             await engine.dispose()

@@ -151,6 +151,21 @@ def test_a_number_used_for_another_body_is_a_dead_letter(town, tmp_path):
     assert "B3" in {tag.tag for tag in town.unknown_tags("posting")}
 
 
+def test_two_agents_under_one_name(town, tmp_path, caplog):
+    """Both run on, taking turns as heartbeats do; the one that is refused says so, the server shows it to all."""
+    with Spool(tmp_path / "a.spool", "twins") as one, Spool(tmp_path / "b.spool", "twins") as other:
+        posters = [town.poster(spool, "posting") for spool in (one, other)]
+        for n in range(6):
+            place = (float(n % 2), n / 10)
+            label = f"twins/{n}"
+            posters[n % 2].post(MoverEntered(seq=0, observed_at=ZERO + timedelta(seconds=n), label=label, xy=place))
+            assert posters[n % 2].drain(10.0)
+        assert one.buried + other.buried > 0
+    view = town.agents.get("twins")
+    assert view.state == "faulty" and view.why.startswith("does another agent run under this name?")
+    assert "numbers of agent twins are taken by other observations" in caplog.text
+
+
 def test_a_lost_spool_continues(town, tmp_path):
     for n in range(2):
         with Spool(tmp_path / f"lost{n}", "lost") as spool:

@@ -12,6 +12,7 @@ from tms_server.agents.repository import AgentRepository
 from tms_server.agents.service import agent_view, unknown_agent
 from tms_server.auth import Caller, require_see
 from tms_server.db.session import ReadSession
+from tms_server.db.tables import AgentRow
 
 router = APIRouter(tags=["agents"])
 Limit = Annotated[int, Query(ge=1, le=1000)]
@@ -24,9 +25,7 @@ async def list_agents(
 ) -> AgentPage:
     """Agents by name, of the rooms that the caller may see."""
     found = await AgentRepository(session).page(after=cursor or "", limit=limit + 1, rooms=caller.rooms())
-    state = request.state
-    now, silent_after_s = state.clock.now(), state.settings.silent_after_s
-    items = [agent_view(row, now=now, silent_after_s=silent_after_s) for row in found[:limit]]
+    items = [_view(request, row) for row in found[:limit]]
     return AgentPage(items=items, next_cursor=items[-1].agent if len(found) > limit else None)
 
 
@@ -37,5 +36,11 @@ async def get_agent(request: Request, agent: AgentId, caller: Caller, session: R
     if row is None:
         return unknown_agent(agent)
     require_see(caller, row.room)
-    state = request.state
-    return agent_view(row, now=state.clock.now(), silent_after_s=state.settings.silent_after_s)
+    return _view(request, row)
+
+
+def _view(request: Request, row: AgentRow) -> AgentView:
+    state, now = request.state, request.state.clock.now()
+    return agent_view(
+        row, now=now, silent_after_s=state.settings.silent_after_s, dispute=state.disputes.of(row.agent, now)
+    )

@@ -12,10 +12,17 @@ from tms_server.db.times import from_us
 State = Literal["connected", "silent", "faulty", "unknown"]
 
 
-def agent_view(row: AgentRow, *, now: datetime, silent_after_s: float) -> AgentView:
-    """An agent that posts nothing for ``silent_after_s`` seconds is silent, whatever it said of itself."""
+def agent_view(row: AgentRow, *, now: datetime, silent_after_s: float, dispute: str = "") -> AgentView:
+    """An agent that posts nothing for ``silent_after_s`` seconds is silent, whatever it said of itself.
+
+    ``dispute``: its name is another one's, too; which of both said the rest nobody knows.
+    """
     last_seen = from_us(row.last_seen)
-    silent = (now - last_seen).total_seconds() > silent_after_s
+    state, why = cast(State, row.state), row.why
+    if (now - last_seen).total_seconds() > silent_after_s:
+        state, why = "silent", f"nothing since {last_seen.isoformat(timespec='seconds')}"
+    if dispute:
+        state, why = "faulty", dispute
     return AgentView(
         agent=row.agent,
         room=row.room,
@@ -25,8 +32,8 @@ def agent_view(row: AgentRow, *, now: datetime, silent_after_s: float) -> AgentV
         last_observed_at=from_us(row.last_observed_at),
         lag_s=(row.last_seen - row.last_observed_at) / 1e6,
         missing=row.next_seq - row.received,
-        state="silent" if silent else cast(State, row.state),
-        why=f"nothing since {last_seen.isoformat(timespec='seconds')}" if silent else row.why,
+        state=state,
+        why=why,
     )
 
 

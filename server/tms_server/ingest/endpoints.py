@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from tms_schemas.observation import BatchAccepted, ObservationBatch
 from tms_server.auth import authenticate, require_observe
+from tms_server.errors import Conflict
 from tms_server.ingest.admission import admit
 from tms_server.town import Town
 
@@ -56,6 +57,10 @@ async def post_observations(request: Request) -> Response:
     batch = admit(await request.body())
     require_observe(caller, batch.room)
     town: Town = request.state.town
-    done = await town.writer.submit(batch)
+    try:
+        done = await town.writer.submit(batch)
+    except Conflict as refused:
+        request.state.disputes.note(batch.agent, refused.detail, request.state.clock.now())
+        raise
     answer = BatchAccepted(accepted=done.accepted, duplicates=done.duplicates, head=done.head, too_late=done.too_late)
     return Response(answer.model_dump_json(), media_type="application/json")

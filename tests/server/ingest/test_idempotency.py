@@ -79,3 +79,16 @@ async def test_agents_are_paged_and_a_fresh_one_starts_at_zero(http: httpx.Async
     assert [agent["agent"] for agent in agents] == ["a", "b", "c"]
     assert {(agent["state"], agent["missing"], agent["next_seq"]) for agent in agents} == {("faulty", 5, 6)}
     assert rest["next_cursor"] is None
+
+
+async def test_two_agents_under_one_name_are_told_to_whoever_looks(http: httpx.AsyncClient, post, seen) -> None:
+    """Each is refused what the other was first with; it must not look like one agent that is well."""
+    await post(seen(0, type="agent_state", state="connected", why=""), seen(1))
+    await post(seen(0, label="b/1"), agent="b")
+    assert (await post({**seen(1), "xy": [4, 4]})).status_code == 409
+    await post(seen(2, type="agent_state", state="connected", why=""))  # the one of both that is first goes on
+    agent = (await http.get("/v1/agents/cab")).json()
+    assert agent["state"] == "faulty" and agent["why"].startswith("does another agent run under this name? Each")
+    assert agent["why"].endswith("cab: seq 1 is recorded with another body; nothing of the batch was recorded")
+    page = (await http.get("/v1/agents")).json()
+    assert {item["agent"]: item["state"] for item in page["items"]} == {"b": "connected", "cab": "faulty"}
