@@ -2,7 +2,7 @@
 
 import tms_agents.compiled  # noqa: F401, before there are kernels
 from tms_agents.floor.estimator import FloorEstimator
-from tms_agents.floor.events import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor.events import Appeared, Back, Confused, FloorEvent, FloorLabel, Met, Moved, Stale, Vanished
 from tms_agents.floor.settings import FloorSettings, Scene, Sensor
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "FloorEvent",
     "FloorLabel",
     "FloorSettings",
+    "Met",
     "Moved",
     "Scene",
     "Sensor",

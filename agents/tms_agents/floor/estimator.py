@@ -49,8 +49,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 23: who may have been exchanged.
-_FORMAT = 23
+#: Of saved states; 24: who stands with whom.
+_FORMAT = 24
 
 
 class FloorEstimator:

@@ -100,4 +100,14 @@ class Confused:
     since: float
 
 
-FloorEvent = Appeared | Moved | Vanished | Stale | Back | Confused
+@dataclass(frozen=True, slots=True)
+class Met:
+    """Two people have stood within reach of each other ``since``: one may have handed the other something then."""
+
+    t: float
+    label: int
+    other: int
+    since: float
+
+
+FloorEvent = Appeared | Moved | Vanished | Stale | Back | Confused | Met

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
-from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Met, Moved, Vanished
 from tms_schemas.events import Near
 from tms_schemas.observation import (
+    HandoverPossible,
     InventoryLabel,
     LabelAppeared,
     LabelMoved,
@@ -158,6 +159,8 @@ class Labels:
             yield from self._walks(mover, event)
         elif isinstance(event, Confused):
             yield from self._swapped(event)
+        elif isinstance(event, Met):
+            yield from self._met(event)
 
     def _entered(self, event: Appeared) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))
@@ -202,12 +205,22 @@ class Labels:
 
     def _swapped(self, event: Confused) -> Iterator[Observation]:
         """Told for the time when they met: what was done since was done by who they may be."""
+        for at, a, b in self._both(event):
+            yield MoverSwap(seq=0, observed_at=at, a=a, b=b, p=event.p)
+
+    def _met(self, event: Met) -> Iterator[Observation]:
+        """How likely it is that something changed hands is a parameter of the room: lasers do not see it."""
+        for at, a, b in self._both(event):
+            yield HandoverPossible(seq=0, observed_at=at, a=a, b=b)
+
+    def _both(self, event: Confused | Met) -> Iterator[tuple[datetime, str, str]]:
+        """When it was, while both were there, and their labels; nothing of robots that report themselves."""
         one, other = self.movers.get(event.label), self.movers.get(event.other)
         if one is None or other is None or one.label is None or other.label is None:
             return
         t = self._after(max(event.since, one.entered + _STEP_S, other.entered + _STEP_S))
         if t < min(one.left, other.left):
-            yield MoverSwap(seq=0, observed_at=self._utc(t), a=one.label, b=other.label, p=event.p)
+            yield self._utc(t), one.label, other.label
 
     def _lies(self, event: Appeared) -> Iterator[Observation]:
         t = self._after(min(event.since or event.t, event.t))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tms_agents.floor import Appeared, Back, Confused, FloorEvent, Stale, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorEvent, Met, Stale, Vanished
 
 
 def told(event: FloorEvent) -> str | None:
@@ -21,6 +21,8 @@ def told(event: FloorEvent) -> str | None:
         return f"mover #{event.label} is back at ({event.xy[0]:.2f}, {event.xy[1]:.2f})"
     if isinstance(event, Confused) and event.since < event.t:
         return f"movers #{event.label} and #{event.other} may have been exchanged ({event.p:.0%})"
+    if isinstance(event, Met):
+        return f"one of movers #{event.label} and #{event.other} may have handed the other something"
     return None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Moved, Stale, Vanished
+from tms_agents.floor import Appeared, Back, Confused, FloorEvent, FloorLabel, Met, Moved, Stale, Vanished
 
 
 class Listener:
@@ -24,6 +24,10 @@ class Listener:
         if isinstance(event, Confused):
             assert {event.label, event.other} <= self.kinds.keys() | self.before and event.label != event.other
             assert 0.0 < event.p <= 1.0 and event.since <= event.t
+            return
+        if isinstance(event, Met):
+            assert {event.label, event.other} <= self.kinds.keys() | self.before and event.label != event.other
+            assert event.since <= event.t
             return
         assert event.label in self.kinds
         if isinstance(event, Stale):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from tms_agents.floor.events import Appeared, Back, Confused, FloorEvent, Moved, Stale, Vanished
+from tms_agents.floor.events import Appeared, Back, Confused, FloorEvent, Met, Moved, Stale, Vanished
 from tms_agents.floor.feet.place import place
 from tms_agents.floor.norm import norm
 
@@ -59,7 +59,7 @@ class Told:
 
     def _new(self, event: FloorEvent) -> FloorEvent | None:
         """The event, if it is news: what is told is known from now on."""
-        if isinstance(event, Confused):
+        if isinstance(event, Confused | Met):
             return event
         if isinstance(event, Vanished):
             if (gone := self._rows.pop(event.label, None)) is not None:

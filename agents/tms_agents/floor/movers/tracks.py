@@ -14,6 +14,7 @@ from tms_agents.floor.feet.place import place, tell
 from tms_agents.floor.movers.absent import Absent
 from tms_agents.floor.movers.doubts import Doubts
 from tms_agents.floor.movers.flickering import Flickering
+from tms_agents.floor.movers.meetings import Meetings
 from tms_agents.floor.movers.reappearing import STEPS_S, missing_one
 from tms_agents.floor.movers.review import (
     BACK,
@@ -85,6 +86,7 @@ class Tracks:
         #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
         self.strides: list[tuple[float, float, float, float]] = []
         self._told, self._doubts = Told(self.bodies.size), Doubts(self.bodies.size)
+        self._meetings = Meetings(self.bodies.size)
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
 
     @property
@@ -94,8 +96,9 @@ class Tracks:
 
     def save(self) -> dict[str, Any]:
         """JSON values, without those of the association."""
-        told = {"told": self._told.save(), "doubts": self._doubts.save(), "strides": list(self.strides)}
-        return {"absent": self.absent.save(), "flickering": self.flickering.save(), **told}
+        told = {"told": self._told.save(), "doubts": self._doubts.save(), "meetings": self._meetings.save()}
+        of_places = {"flickering": self.flickering.save(), "strides": list(self.strides)}
+        return {"absent": self.absent.save(), **of_places, **told}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
@@ -104,6 +107,7 @@ class Tracks:
         self.strides = [(float(t), float(x), float(y), float(matters)) for t, x, y, matters in saved["strides"]]
         self._told.restore(saved["told"])
         self._doubts.restore(saved["doubts"])
+        self._meetings.restore(saved["meetings"])
 
     def review(
         self,
@@ -157,7 +161,8 @@ class Tracks:
                 events.append(Vanished(t, int(body["label"]), float(body["seen"]), t))
             elif action in (MOVED, BROAD):
                 events.append(Moved(t, *self._tell(index, t)))
-        return self._told.agree([*events, *confused, *self._doubts.gone(events, t)], self.bodies, t)
+        met = self._meetings.gone(events, t) + self._meetings.look(self.bodies, t)
+        return self._told.agree([*events, *confused, *met, *self._doubts.gone(events, t)], self.bodies, t)
 
     def labels(self, t: float) -> list[FloorLabel]:
         """The movers there are, but for those who are ``awaited``."""
