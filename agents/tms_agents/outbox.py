@@ -57,6 +57,7 @@ class Outbox:
         self._told: dict[str, DeviceState] = {}
         self._inventory_at: float | None = None
         self._dirty = asyncio.Event()
+        self._kept = True
 
     def post(self, observations: list[Observation]) -> None:
         if observations:
@@ -83,7 +84,7 @@ class Outbox:
         """What is in the queue into the spool, the state on the disk."""
         while not self._queue.empty():
             await self._agent.observations(*self._queue.get_nowait())
-        save_state(self._file, self._name, await self._remembered())
+        self._keep(await self._remembered())
 
     async def post_inventory(self) -> None:
         self.post([await _now(self._inventory())])
@@ -115,8 +116,13 @@ class Outbox:
                     await self._dirty.wait()
             self._dirty.clear()
             state = await self._remembered()
-            await asyncio.to_thread(save_state, self._file, self._name, state)
+            await asyncio.to_thread(self._keep, state)
             await asyncio.sleep(self._save_pause_s)
+
+    def _keep(self, state: dict[str, Any]) -> None:
+        """On the disk, unless that was too full for the numbers of labels in it: a restart would give them again."""
+        if self._agent.remembers:
+            self._kept = save_state(self._file, self._name, state, quiet=not self._kept)
 
     async def _remembered(self) -> dict[str, Any]:
         memory: dict[str, Any] = await _now(self._memory())

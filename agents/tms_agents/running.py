@@ -85,6 +85,7 @@ class Running:
         self._poster, self._clock = poster, clock
         #: Newest time of anything posted.
         self.newest: datetime | None = None
+        self._losing, self._lost_before = False, 0
 
     def now(self) -> datetime:
         """By the clock, and not before anything that was posted: it may have been set back meanwhile."""
@@ -96,22 +97,35 @@ class Running:
         return self._poster.spool.new_label()
 
     @property
+    def remembers(self) -> bool:
+        """Whether all labels that were given are on the disk (``Spool.remembers``)."""
+        return self._poster.spool.remembers
+
+    @property
     def waiting(self) -> int:
         """Observations that the server has not acknowledged."""
         return len(self._poster.spool)
 
     async def observations(self, *observations: Observation) -> bool:
-        """Into the spool, all or none. A full spool is said once, what it refuses is counted as lost (False)."""
+        """Into the spool, all or none. What a full one, or a full disk, refuses is counted as lost (False).
+
+        It is said when that begins and when it is over.
+        """
         if not observations:
             return True
         self.newest = max([one.observed_at for one in observations] + ([self.newest] if self.newest else []))
         try:
             await self._poster.post(*observations)
         except SpoolFull as full:
-            if not self.posted.lost:
+            if not self._losing:
+                self._losing, self._lost_before = True, self.posted.lost
                 log.error("%s; what is seen now is lost", full)
             self.posted.lost += len(observations)
             return False
+        if self._losing:
+            self._losing = False
+            lost = self.posted.lost - self._lost_before
+            log.warning("the spool of %s takes observations again; %d were lost", self._poster.spool.agent, lost)
         self.posted.observations += len(observations)
         return True
 

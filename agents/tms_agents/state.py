@@ -39,12 +39,13 @@ def load_state(path: Path, agent: str) -> dict[str, Any]:
         return {}
 
 
-def save_state(path: Path, agent: str, state: dict[str, Any]) -> bool:
-    """False where the disk refuses; the agent goes on, an old state is better than none."""
+def save_state(path: Path, agent: str, state: dict[str, Any], *, quiet: bool = False) -> bool:
+    """False where the disk refuses, which is said; the agent goes on, an old state is better than none."""
     try:
         write_atomically(path, json.dumps({"format": _FORMAT, "agent": agent} | state).encode())
     except OSError as error:
-        log.warning("state %s: %s", path, error)
+        if not quiet:
+            log.warning("state %s: %s; it stays as it was saved last", path, error.strerror or error)
         return False
     return True
 

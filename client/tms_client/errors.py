@@ -5,7 +5,7 @@ TownError
 ├── BadAnswer              an answer that is not the wire of this version
 ├── Ambiguous              a name that several objects carry (``candidates``)
 ├── SpoolError
-│   └── SpoolFull          the spool holds as much as it may
+│   └── SpoolFull          the spool holds as much as it may, or as its disk does
 └── Refused                the server answered with an error (``status``, ``problem``)
     ├── BadRequest         400
     ├── Unauthenticated    401

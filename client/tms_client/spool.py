@@ -2,7 +2,8 @@
 
 An observation is in the spool when ``put`` returns and leaves it only by ``acknowledge`` or, with the server's reason,
 as a dead letter by ``bury``. Sequence and label numbers are persisted here and never used twice. A spool that is full
-refuses; it drops nothing. One process owns a spool file: a second one is refused.
+refuses; it drops nothing. So does one whose disk is full or fails: what it took stays, and it takes again when the disk
+does. One process owns a spool file: a second one is refused.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from typing import NamedTuple
 from tms_client.api import to_wire
 from tms_client.errors import SpoolError, SpoolFull
 from tms_schemas.observation import Observation
+
+#: The disk is full, or over its quota, or fails: that may pass.
+_REFUSALS = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 
 
 class Item(NamedTuple):
@@ -65,6 +69,8 @@ class Spool:
         self._max_items, self._max_bytes, self._max_dead = max_items, max_bytes, max_dead
         self._clock = clock
         self._lock = threading.RLock()
+        #: The next label number, where the disk has not taken it yet.
+        self._next_label: int | None = None
         try:
             Path(path).parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(path, timeout=1.0, isolation_level=None, check_same_thread=False)
@@ -86,7 +92,7 @@ class Spool:
         ``keep`` are notes of the agent to itself (see ``kept``), written together with what they belong to.
 
         Raises:
-            SpoolFull: there is no place; the refusal is counted in ``refused``.
+            SpoolFull: there is no place; the refusal is counted in ``refused``, unless it is the disk that is full.
         """
         bodies = [to_wire(one, numbered=False) for one in observations]
         size = sum(map(_size, bodies))
@@ -104,18 +110,32 @@ class Spool:
                 self._db.executemany("INSERT INTO item (seq, room, body) VALUES (?, ?, ?)", rows)
                 if first is not None:
                     self._set("next_seq", first + len(bodies))
+                if self._next_label is not None:  # what is put names labels that were given since
+                    self._set("next_label", self._next_label)
                 self._db.executemany("INSERT OR REPLACE INTO note (name, text) VALUES (?, ?)", (keep or {}).items())
+            self._next_label = None
             self.pending += len(bodies)
             self.pending_bytes += size
 
     def new_label(self) -> str:
-        """A label id ``agent/n`` that this agent never used and never will again."""
-        with self._lock, self._transaction():
-            n = self._get("next_label")
-            if n is None:
-                n = int(self._clock() * 1000)
-            self._set("next_label", n + 1)
+        """A label id ``agent/n`` that this agent never used and never will again.
+
+        Also where the disk is full: nothing that names it is taken before its number is on the disk.
+        """
+        with self._lock:
+            n = self._get("next_label") if self._next_label is None else self._next_label
+            n = int(self._clock() * 1000) if n is None else n
+            self._next_label = n + 1
+            with contextlib.suppress(SpoolFull):
+                with self._transaction():
+                    self._set("next_label", n + 1)
+                self._next_label = None
         return f"{self.agent}/{n}"
+
+    @property
+    def remembers(self) -> bool:
+        """Whether all labels that were given are on the disk: before that nobody else may note them down."""
+        return self._next_label is None
 
     def kept(self, name: str) -> str | None:
         """The last note of that name; a restarted agent goes on from it. None where there is none."""
@@ -135,15 +155,19 @@ class Spool:
 
         A spool that is ahead stays so; one that fell behind (restored from an old copy) jumps forward.
         """
-        with self._lock, self._transaction():
-            known = self.next_seq
-            seq = max(known or 0, next_seq)
-            if known is None or next_seq > known:
-                self._set("next_label", max(self._get("next_label") or 0, first_label))
-            waiting = self._db.execute("SELECT n FROM item WHERE seq IS NULL ORDER BY n").fetchall()
-            numbered = [(seq + i, n) for i, (n,) in enumerate(waiting)]
-            self._db.executemany("UPDATE item SET seq = ? WHERE n = ?", numbered)
-            self._set("next_seq", seq + len(waiting))
+        with self._lock:
+            with self._transaction():
+                known = self.next_seq
+                seq = max(known or 0, next_seq)
+                further = known is None or next_seq > known
+                if further:
+                    self._set("next_label", max(self._next_label or self._get("next_label") or 0, first_label))
+                waiting = self._db.execute("SELECT n FROM item WHERE seq IS NULL ORDER BY n").fetchall()
+                numbered = [(seq + i, n) for i, (n,) in enumerate(waiting)]
+                self._db.executemany("UPDATE item SET seq = ? WHERE n = ?", numbered)
+                self._set("next_seq", seq + len(waiting))
+            if further:
+                self._next_label = None
 
     def peek(self, limit: int) -> list[Item]:
         """The oldest numbered observations, at most ``limit``, all of one room."""
@@ -226,15 +250,16 @@ class Spool:
 
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[None]:
-        self._db.execute("BEGIN IMMEDIATE")
         try:
+            self._db.execute("BEGIN IMMEDIATE")
             yield
             self._db.execute("COMMIT")
         except BaseException as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
-            if isinstance(error, sqlite3.Error):  # the disk is full or gone
-                raise SpoolError(f"spool of {self.agent}: {error}") from error
+            if isinstance(error, sqlite3.Error):
+                refused = error.sqlite_errorcode & 0xFF in _REFUSALS
+                raise (SpoolFull if refused else SpoolError)(f"spool of {self.agent}: {error}") from error
             raise
 
     def _get(self, name: str) -> int | None:

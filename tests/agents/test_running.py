@@ -128,3 +128,19 @@ async def test_a_full_spool_is_counted_and_said_once(tmp_path, caplog):
         told = [await agent.observations(RawRead(seq=0, observed_at=NOW, zone="z", tag=f"T{n}")) for n in range(4)]
     assert told == [True, False, False, False] and (posted.observations, posted.lost) == (1, 3)
     assert caplog.text.count("what is seen now is lost") == 1
+
+
+async def test_it_is_said_when_a_full_spool_takes_again_and_when_it_is_full_once_more(tmp_path, caplog):
+    def one(n: int) -> RawRead:
+        return RawRead(seq=0, observed_at=NOW, zone="z", tag=f"T{n}")
+
+    with Spool(tmp_path / "spool", "a") as known:
+        known.continue_at(0)
+    posted = Posted()
+    async with running(config(tmp_path, max_items=1), drain_s=0, posted=posted) as agent:
+        for _ in range(2):
+            assert [await agent.observations(one(n)) for n in range(3)] == [True, False, False]
+            agent._poster.spool.acknowledge(agent._poster.spool.peek(9))
+        assert await agent.observations(one(9))
+    assert caplog.text.count("what is seen now is lost") == 2 and posted.lost == 4
+    assert caplog.text.count("takes observations again; 2 were lost") == 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import resource
 import signal
 import subprocess
 import sys
@@ -77,6 +79,67 @@ def test_a_full_spool_refuses_whole_and_counts(tmp_path, bound):
         spool.acknowledge(spool.peek(9))
         spool.put("r", read("B"))
         assert [item.seq for item in spool.peek(9)] == [1]
+
+
+@contextlib.contextmanager
+def full_disk(path: Path):
+    """No file may grow beyond what the log of the spool has now."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.with_name(path.name + "-wal").stat().st_size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_full_disk_refuses_and_what_was_taken_stays(tmp_path):
+    path = tmp_path / "s"
+    with Spool(path, "a") as spool:
+        spool.continue_at(0)
+        spool.put("r", read("A"), read("B"))
+        with full_disk(path):
+            with pytest.raises(SpoolFull, match="spool of a: disk I/O error"):
+                spool.put("r", read("C"))
+            assert (len(spool), spool.next_seq) == (2, 2)
+            items = spool.peek(9)
+            with pytest.raises(SpoolError):
+                spool.acknowledge(items)
+            assert spool.peek(9) == items
+        spool.put("r", read("D"))
+        spool.acknowledge(items)
+        assert [(item.seq, "D" in item.body) for item in spool.peek(9)] == [(2, True)]
+
+
+def test_labels_given_while_the_disk_is_full_do_not_return(tmp_path):
+    """Only what was taken names them, and their numbers are taken with it, whenever the power goes."""
+    path = tmp_path / "s"
+    spool = Spool(path, "a")
+    spool.continue_at(0)
+    first = spool.new_label()
+    with full_disk(path):
+        given = [spool.new_label() for _ in range(3)]
+        assert len({first, *given}) == 4 and not spool.remembers
+    spool.put("r", read("A"))
+    assert spool.remembers
+    spool.close()
+    with Spool(path, "a") as again:
+        assert again.new_label() not in {first, *given}
+        with full_disk(path):
+            lost = again.new_label()
+    with Spool(path, "a") as again:
+        assert again.new_label() == lost, "nothing that names it was ever taken"
+
+
+def test_labels_given_while_the_disk_is_full_are_beyond_what_the_server_knows(tmp_path):
+    path = tmp_path / "s"
+    with Spool(path, "a", clock=lambda: 1000.0) as spool:
+        with full_disk(path):
+            first = spool.new_label()
+            with pytest.raises(SpoolError):
+                spool.continue_at(50, first_label=2_000_000)
+            assert spool.new_label() == "a/1000001"
+        spool.continue_at(50, first_label=2_000_000)
+        assert (first, spool.new_label()) == ("a/1000000", "a/2000000") and spool.remembers
 
 
 def test_dead_letters_are_bounded_and_counted(tmp_path):
