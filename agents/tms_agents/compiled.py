@@ -4,11 +4,14 @@ numba takes what a kernel calls into its machine code, but keeps it on disk for 
 is the same (https://github.com/numba/numba/issues/1833): after an update that changed only what is called, the old code
 would go on running. The stamp here is of that file and of all in this package that it imports, and they import. To be
 imported before the first kernel is decorated: by each package that has some.
+
+Where a kernel cannot be kept (the disk is full) it is used all the same.
 """
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -16,8 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import CacheImpl
+from numba.core.caching import Cache, CacheImpl
 
+log = logging.getLogger(__name__)
 _PACKAGE = Path(__file__).resolve().parent
 _IMPORT = re.compile(
     rf"^\s*from ({_PACKAGE.name}[\w.]*) import (\([^)]*\)|.*)|^\s*import ({_PACKAGE.name}[\w.]*)", re.M
@@ -57,6 +61,25 @@ class KernelLocator:
 _config: Any = numba.config
 if not _config.CACHE_LOCATOR_CLASSES:  # ``NUMBA_CACHE_LOCATOR_CLASSES``: who sets it has a reason
     _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__qualname__}"
+
+_keep: Any = Cache.save_overload
+
+
+def keep_if_possible(self: Any, signature: Any, kernel: Any) -> None:
+    """numba would end the program where what it has just compiled cannot be written."""
+    try:
+        _keep(self, signature, kernel)
+    except OSError as error:
+        _say_once(error.strerror or str(error))
+
+
+@cache
+def _say_once(why: str) -> None:
+    log.warning("what was compiled cannot be kept (%s): it is compiled again at the next start", why)
+
+
+_cache: Any = Cache
+_cache.save_overload = keep_if_possible
 
 
 @cache

@@ -116,6 +116,19 @@ def test_a_process_is_killed_while_it_keeps_a_kernel(package: Path) -> None:
     assert run(package)[0] == 6.0
 
 
+@pytest.mark.parametrize("most", [0, 2000])
+def test_a_full_disk_keeps_no_kernel_from_its_work(package: Path, most: int) -> None:
+    """Nothing can be written, or the index and not the code: that is said once, and it is kept when there is place."""
+    full = f"import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))\n"
+    done = subprocess.run(
+        [sys.executable, "-c", full + _RUN], env=environment(package), capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["3.0", "0"]
+    assert done.stderr == "what was compiled cannot be kept (File too large): it is compiled again at the next start\n"
+    assert run(package) == (3.0, 0)
+    assert run(package) == (3.0, 1)
+
+
 def test_kernels_of_the_version_before_go(package: Path) -> None:
     run(package)
     before = {path.name for path in package.rglob("*.nb[ci]")}
