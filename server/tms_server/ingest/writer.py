@@ -16,6 +16,8 @@ from tms_server.settings import Settings
 _log = logging.getLogger(__name__)
 #: Observations of one transaction, at most (a batch is never split).
 _GROUP = 5000
+#: That the log cannot be written is said so often.
+_SAY_S = 60.0
 
 
 class _Waiting(NamedTuple):
@@ -38,6 +40,8 @@ class GroupWriter:
         self._total = 0
         self._wake = asyncio.Event()
         self._closing = False
+        #: Batches refused since the log was written last, and when that was said.
+        self._refused, self._said_at = 0, 0.0
 
     async def submit(self, batch: Batch) -> Appended:
         """Returns after durability.
@@ -79,10 +83,14 @@ class GroupWriter:
             verdicts = await self._log.append([waiting.batch for waiting in group])
         except Exception as error:
             # Whatever it was, the writer goes on: without it every agent would wait for ever.
-            _log.error("%d batches refused: %s", len(group), error, exc_info=error.__cause__ or error)
+            self._say_refused(len(group), error)
             known = error if isinstance(error, TmsError) else Unavailable("the log cannot be written", retry_after_s=5)
             # An exception of its own for each: a raised one grows a traceback per waiter.
             verdicts = [Unavailable(known.detail, retry_after_s=known.retry_after_s) for _ in group]
+        else:
+            if self._refused:
+                _log.warning("the log is written again; %d batches were refused, and are sent again", self._refused)
+            self._refused = 0
         for waiting, verdict in zip(group, verdicts, strict=True):
             if waiting.verdict.done():  # the client went away; what was recorded is a duplicate when it comes back
                 continue
@@ -90,6 +98,15 @@ class GroupWriter:
                 waiting.verdict.set_result(verdict)
             else:
                 waiting.verdict.set_exception(verdict)
+
+    def _say_refused(self, batches: int, error: Exception) -> None:
+        """Where it happened, the first time; then how often, now and then: agents try again all the time."""
+        now = asyncio.get_running_loop().time()
+        if not self._refused or now - self._said_at >= _SAY_S:
+            seen = None if self._refused else error.__cause__ or error
+            _log.error("%d batches refused: %s", self._refused + batches, error, exc_info=seen)
+            self._said_at = now
+        self._refused += batches
 
     def _admit(self, batch: Batch) -> None:
         count, limits = len(batch.observations), self._settings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Sequence
 from functools import partial
@@ -66,7 +67,9 @@ class SqlRoomLog:
         try:
             plan = await self._store.append(batches, choose)
         except Exception as error:
-            raise Unavailable(f"the log cannot be written: {type(error).__name__}", retry_after_s=2) from error
+            # What SQLite says is of the disk; what others say may hold rows and addresses.
+            why = str(error) if isinstance(error, sqlite3.Error) else type(error).__name__
+            raise Unavailable(f"the log cannot be written: {why}", retry_after_s=2) from error
         self._tail.add(plan.blocks)
         for room, facts in plan.rooms.items():
             self._committed[room] = facts.head

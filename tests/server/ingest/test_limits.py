@@ -99,6 +99,20 @@ async def test_a_failing_log_refuses_each_and_the_writer_lives(slow: Any) -> Non
     assert (await writer.submit(batch("a", 1))).accepted == 1
 
 
+async def test_a_log_that_fails_for_long_does_not_fill_the_disk_with_saying_so(slow: Any, caplog: Any) -> None:
+    log, writer, _ = slow
+    log.go.set()
+    for n in range(2):
+        log.failure = Unavailable("the log cannot be written: database or disk is full", retry_after_s=2)
+        for _ in range(50):
+            with pytest.raises(Unavailable, match="disk is full"):
+                await writer.submit(batch("a", 1))
+        log.failure = None
+        await writer.submit(batch("a", 1))
+        assert caplog.text.count("batches refused: the log cannot be written: database or disk is full") == n + 1
+        assert caplog.text.count("written again; 50 batches were refused") == n + 1
+
+
 async def test_after_the_end_nothing_is_taken(slow: Any) -> None:
     log, writer, _ = slow
     waiting = asyncio.create_task(writer.submit(batch("a", 3)))
