@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-fast check format bench bench-cabinet bench-floor bench-feet bench-whose bench-names bench-places floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
+.PHONY: demo test test-fast check format bench bench-cabinet bench-floor bench-feet bench-whose bench-names bench-meetings bench-places floor-pictures bench-hand bench-slam bench-threads bench-localise bench-light bench-semidynamic bench-semidynamic-paper faults fuzz realdata peers clean help
 
 help:
 	@echo "make demo      run the demo until Ctrl-C"
@@ -17,6 +17,7 @@ help:
 	@echo "make bench-feet     whose foot has landed, decision by decision (FEET='--fit' fits the numbers behind it)"
 	@echo "make bench-whose    how likely the costs of feet make what is right (WHOSE='--fit' fits them again)"
 	@echo "make bench-names    how likely people who met are told to have been exchanged, and how often they were"
+	@echo "make bench-meetings who is told to have stood with whom, and who did"
 	@echo "make bench-places   where people in shoes are told to be, and the fit of the numbers behind it"
 	@echo "make floor-pictures tracks of recordings of real people (docs/floor_tracks)"
 	@echo "make bench-slam     laser mapping on public logs and simulated buildings (SLAM='--only logs')"
@@ -66,6 +67,9 @@ bench-whose: $(READY)
 
 bench-names: $(READY)
 	$(BIN)/python benchmarks/floor_names.py $(NAMES)
+
+bench-meetings: $(READY)
+	$(BIN)/python benchmarks/floor_meetings.py $(MEETINGS)
 
 bench-places: $(READY)
 	$(BIN)/python benchmarks/floor_places.py
