@@ -49,8 +49,8 @@ _UNSETTLED_S = 30.0
 _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
-#: Of saved states; 24: who stands with whom.
-_FORMAT = 24
+#: Of saved states; 25: where somebody went on two feet last.
+_FORMAT = 25
 
 
 class FloorEstimator:
@@ -184,7 +184,7 @@ class FloorEstimator:
                 other.move(self._extrinsics.pose(other.index))
                 other.refine(self._extrinsics.scale(other.index))
         vanished = objects.weigh(self._looks, bodies, t, dt)
-        self._tracks.stepped(objects.walked, t)
+        self._tracks.strides.add(objects.walked, t)
         movers = self._tracks.review(
             t,
             dt,
@@ -195,6 +195,8 @@ class FloorEstimator:
             learned=view.background.learned,
             legs=only_legs(self._shoes),
         )
+        self._prints["whose"][self._tracks.no_feet] = -1
+        self._prints["revealed"][self._tracks.furniture] = MOVED
         appeared: list[FloorEvent] = []
         if view.background.learned:
             intact = joins(prints, bodies, t) and not self._furniture.lacks(self._pieces())

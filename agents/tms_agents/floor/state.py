@@ -143,6 +143,8 @@ _BESIDES = [
     ("lone", "f8"),  # s for which it has stood on one foot alone
     ("lone_x", "f8"),  # m, where
     ("lone_y", "f8"),
+    ("walked_x", "f8"),  # m, where it was when it was last seen to go on two feet, or where it began
+    ("walked_y", "f8"),
     ("rest_x", "f8"),  # m, where it has stayed
     ("rest_y", "f8"),
     ("rest_at", "f8"),  # s, since when

@@ -25,6 +25,8 @@ WIDE_M = 0.4
 _SEEN_S, _JUST_S = 0.25, 1.5
 #: Of whom two feet were seen at once in this share of so many scans is no robot.
 _TWO_FEET, _PERSON_HITS = 0.2, 80
+#: Who has taken so many steps, and was wide in a smaller share of late, walks on two feet.
+_STEPS, _NARROW = 2, 0.3
 #: As furniture looks who was too wide for feet in such a share of late: more than makes a robot (`recognize`), which is
 #: looked for first.
 _FURNITURE = 0.65
@@ -122,6 +124,7 @@ def begin(body: Any, c: Any, print_index: int, t: float) -> None:
     body.b_px, body.b_py, body.b_ox, body.b_oy, body.b_land, body.b_stood = 1e9, 1e9, 1e9, 1e9, NEVER, NEVER
     body.stride, body.side, body.lone, body.pushed = 0.6, 0.0, 0.0, 0.0
     body.lone_x, body.lone_y = c.x, c.y
+    body.walked_x, body.walked_y = c.x, c.y
     body.rest_x, body.rest_y, body.rest_at, body.older = c.x, c.y, t, 0.0
     body.stay_x, body.stay_y, body.stay, body.stay_broad, body.broadest = c.x, c.y, 0.0, 0.0, c.width
     body.stay_thin, body.stay_lands, body.spacing = 0.0, 0.0, c.spacing
@@ -236,6 +239,8 @@ def update(
     if not one:
         body.width += 0.1 * (width - body.width)
     body.far = max(body.far, width) if body.hits > 3 else width
+    if body.wide < _NARROW and body.own_stance_n >= _STEPS:
+        body.walked_x, body.walked_y = body.x, body.y
     _measure(body, x - body.x, y - body.y, 1.0, 0.0, noise)
     if slow < np.inf:
         _measure(body, vx - body.vx, vy - body.vy, 0.0, 1.0, slow)

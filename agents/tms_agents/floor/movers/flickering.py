@@ -18,10 +18,10 @@ _STAY_M, _BROAD_M, _BROAD_SHOES_M = 0.6, 0.3, 0.35
 _STAYS_S, _SELDOM_S, _SELDOM = 6.0, 0.6, 0.04
 #: The same of whom the feet are known, where they may be shoes.
 _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
-#: Nor does he look so thin (m) for so much of the time, where people show legs and where they may show shoes; of shoes
-#: that far away that beams are farther apart than this (m) hardly more comes back, but not for so long (s).
-_THIN_M, _THIN_LEGS, _THIN_SHOES = 0.05, 0.4, 0.7
-_FAR_M, _STAYS_FAR_S = 0.02, 25.0
+#: Nor does he look so thin (m) for so much of the time, where people show legs and where they may show shoes, also that
+#: far away that beams are farther apart than this (m).
+_THIN_M, _THIN_LEGS, _THIN_SHOES, _THIN_FAR = 0.05, 0.4, 0.7, 0.85
+_FAR_M = 0.02
 #: Nobody's feet land so often (1/s) in so long (s), seen from as far; nearby each scan sees a leg anew that swings.
 _LANDS_S, _LEGS_LAND, _SHOES_LAND = 8.0, 4.5, 3.5
 #: What is pushed goes so far (m) at most.
@@ -62,8 +62,8 @@ def flickers(body: Any, legs: bool) -> bool:
 @njit(cache=True)
 def _is_thin(body: Any, legs: bool) -> bool:
     """Too thin for too much of the time, or never a foot."""
-    stays_s = _STAYS_S if legs or body.spacing < _FAR_M else _STAYS_FAR_S
-    thin = body.stay > stays_s and body.stay_thin > (_THIN_LEGS if legs else _THIN_SHOES) * body.stay
+    share = _THIN_LEGS if legs else _THIN_SHOES if body.spacing < _FAR_M else _THIN_FAR
+    thin = body.stay > _STAYS_S and body.stay_thin > share * body.stay
     return bool(thin or (body.hits > _OFTEN and body.far < _PART_M))
 
 

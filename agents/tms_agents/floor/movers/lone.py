@@ -62,7 +62,8 @@ def count_lone(bodies: Any, b: int, t: float, dt: float, sight: Sight) -> None:
             body.lone = 0.0
         return
     x, y, at = (body.bx, body.by, body.b_seen) if only_a else (body.ax, body.ay, body.a_seen)
-    behind = t - at > 0.5 and clear(x, y, _STEP_M, sight) == HIDDEN
+    # Of whom two feet were hardly ever seen at once nothing need be hidden there.
+    behind = t - at > 0.5 and body.both >= _BOTH_SHOES and clear(x, y, _STEP_M, sight) == HIDDEN
     if body.lone == 0.0:
         body.lone_x, body.lone_y = foot_x, foot_y
     if body.older > _OLDER_S or suspected(body):
@@ -97,9 +98,11 @@ def _may_have_gone(bodies: Any, b: int) -> bool:
 def _is_lone(body: Any, t: float) -> bool:
     """Whether all that is seen of a person, unmoved for some time, may be a thing or two."""
     no_shoe = wears_shoes(body) and body.width > LONGEST_SHOE_M
-    if body.robot or body.wide > 0.6 or (body.width > _LEGS_M and not no_shoe):
-        return False
     apart = norm(body.ax - body.bx, body.ay - body.by)
+    # Who has walked in shoes, and whose other one was farther away than anybody stands, stands on no two side by side.
+    strode = body.shoe >= SHOES and apart > _STRIDE_M and has_walked(body)
+    if body.robot or body.wide > 0.6 or (body.width > _LEGS_M and not no_shoe and not strode):
+        return False
     a, b = t - body.a_seen, t - body.b_seen
     parts = body.a_print != body.b_print and apart < _ONE_M and body.odd != UNLIKE
     if (max(a, b) < _BOTH_SEEN_S and parts) or _is_one_print(body, t):

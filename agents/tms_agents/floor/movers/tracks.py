@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,13 @@ from tms_agents.floor.movers.absent import Absent
 from tms_agents.floor.movers.doubts import Doubts
 from tms_agents.floor.movers.flickering import Flickering
 from tms_agents.floor.movers.meetings import Meetings
-from tms_agents.floor.movers.reappearing import STEPS_S, missing_one
+from tms_agents.floor.movers.reappearing import missing_one
 from tms_agents.floor.movers.review import (
     BACK,
     BROAD,
     CONFIRM,
     FLICKERS,
     GONE,
-    LIKELY,
     LOST,
     MOVED,
     NOTHING,
@@ -37,6 +36,7 @@ from tms_agents.floor.movers.review import (
     review,
     unseen,
 )
+from tms_agents.floor.movers.strides import Strides
 from tms_agents.floor.movers.told import Told
 from tms_agents.floor.movers.twice import began, suspect
 from tms_agents.floor.movers.whereabouts import Whereabouts
@@ -47,6 +47,8 @@ from tms_agents.floor.state import CONCEALED, NEVER, SEATED
 
 #: How much what is seen next of somebody lost must look like feet.
 _DOUBTED = 0.5
+#: What was wide in such a share of late is furniture if it is nobody.
+_WIDE = 0.5
 #: What began as a piece of furniture and is still so broad (m) in the mean is one.
 _PIECE_M = 0.25
 #: What is pushed is left within this (m).
@@ -67,8 +69,6 @@ _SITS_S = 86400.0
 #: Who sits does so this far (m) from the edge of the seat, and for certain, if his feet have vanished in clear view for
 #: so long (s).
 _DEEP_M, _CLEAR_S = 0.25, 0.3
-#: Somebody who shifts a foot puts it down so near (m), and is looked for so long (s); seen so often, he is there.
-_SHIFT_M, _BY_ITSELF_S, _HITS = 0.35, 2.0, 5
 
 
 class Tracks:
@@ -83,8 +83,11 @@ class Tracks:
         self._robots = scene.robots
         self.absent = Absent(self._where.gates, self._region)
         self.flickering = Flickering()
-        #: Where feet were that were taken for things: when they were seen last, x, y (m), for how long it matters.
-        self.strides: list[tuple[float, float, float, float]] = []
+        #: Feet that were taken for things.
+        self.strides = Strides()
+        #: Of the scan that was reviewed last: prints that have turned out to be no feet, and those that are furniture.
+        self.no_feet: list[int] = []
+        self.furniture: list[int] = []
         self._told, self._doubts = Told(self.bodies.size), Doubts(self.bodies.size)
         self._meetings = Meetings(self.bodies.size)
         self._actions, self._rows = np.zeros(self.bodies.size, np.int64), np.zeros(self.bodies.size, np.int64)
@@ -97,14 +100,14 @@ class Tracks:
     def save(self) -> dict[str, Any]:
         """JSON values, without those of the association."""
         told = {"told": self._told.save(), "doubts": self._doubts.save(), "meetings": self._meetings.save()}
-        of_places = {"flickering": self.flickering.save(), "strides": list(self.strides)}
+        of_places = {"flickering": self.flickering.save(), "strides": self.strides.save()}
         return {"absent": self.absent.save(), **of_places, **told}
 
     def restore(self, saved: Any) -> None:
         """Raises KeyError, TypeError or ValueError where that is nothing that ``save`` gave."""
         self.absent.restore(saved["absent"])
         self.flickering.restore(saved["flickering"])
-        self.strides = [(float(t), float(x), float(y), float(matters)) for t, x, y, matters in saved["strides"]]
+        self.strides.restore(saved["strides"])
         self._told.restore(saved["told"])
         self._doubts.restore(saved["doubts"])
         self._meetings.restore(saved["meetings"])
@@ -128,8 +131,9 @@ class Tracks:
         """
         judge: Any = review
         judge(self.bodies, t, dt, sight, self._waits, self._actions, bool(self._region.polygons), learned, legs)
+        self.no_feet, self.furniture = [], []
         self._see_off(t)
-        self._believe_steps(t)
+        self._actions[list(self.strides.found(self.bodies, t))] = CONFIRM
         confused = self._doubts.look(self.bodies, self._association.belief, self._association.scattered, t)
         confused += self._doubts.given_back(self._association.rename(t), t)
         events: list[FloorEvent] = self.absent.gone(t) + self._unite(t) + self._gone_out(t)
@@ -141,8 +145,11 @@ class Tracks:
             if action == FLICKERS:
                 self.flickering.found(body, t)
             if action in (THING, FLICKERS) or (action == PIECE and is_furniture(body)):
-                # Somebody who is known for long has gone on from there.
-                events += self._lost(index, t, thing=True) if is_somebody(body) else self._gone(index, t)
+                if action == THING and body["wide"] > _WIDE:
+                    self.furniture += _prints(body)
+                # Somebody who is known for long, or has begun to be seen elsewhere, has gone on from there.
+                gone_on = is_somebody(body) or began(self.bodies, body, True) >= 0
+                events += self._lost(index, t, thing=True) if gone_on else self._gone(index, t)
             elif action == GONE:
                 events += self._gone(index, t)
             elif action == LOST:
@@ -182,21 +189,6 @@ class Tracks:
         self.bodies[index]["confirmed"] = 1
         self._go_on(index, old)
         return self._told.agree([Back(t, *self._tell(index, t))], self.bodies, t)
-
-    def stepped(self, walked: Sequence[tuple[float, float, float]], t: float) -> None:
-        """Things have gone by themselves (`Objects.walked`): they were feet, and whose they were is near."""
-        self.strides += [(*one, t + _BY_ITSELF_S) for one in walked]
-
-    def _believe_steps(self, t: float) -> None:
-        """Who is new where a thing has gone by itself need not walk to be believed."""
-        self.strides = [stride for stride in self.strides if t < stride[3]]
-        for since, x, y, _ in self.strides:
-            for index, body in enumerate(self.bodies):
-                new = body["used"] and not body["confirmed"] and body["seen"] == t and body["from_furniture"] == 0
-                steps = body["first"] > since - STEPS_S and body["hits"] >= _HITS and body["wide"] < 0.3
-                likely = body["score"] >= LIKELY * body["hits"]
-                if new and steps and likely and math.hypot(body["x"] - x, body["y"] - y) < _SHIFT_M:
-                    self._actions[index] = CONFIRM
 
     def _gone(self, index: int, t: float) -> list[FloorEvent]:
         body = self.bodies[index]
@@ -266,6 +258,7 @@ class Tracks:
         if body["seen"] == t:
             # What is seen is something else.
             self._association.decide(index)
+            self.no_feet += _prints(body)
             if (new := began(self.bodies, body, thing)) >= 0:
                 return self._merge(index, new, t)
             body["a_print"] = body["b_print"] = -1
@@ -326,7 +319,8 @@ class Tracks:
         hidden = (self.bodies["used"] == 1) & (self.bodies["confirmed"] == 1) & (self.bodies["stale"] != 0)
         self.absent.came(body, not hidden.any())
         if self.absent.inside(body) and not robot and not is_footless(body):
-            suspect(self.bodies, index, t)
+            for bodies in self._association.hypotheses:
+                suspect(bodies, index, t)
         label, xy, cov = self._tell(index, t)
         return [Appeared(t, label, "mover", xy, cov, robot, float(body["first"]), (), float(body["width"]))]
 
@@ -366,6 +360,10 @@ class Tracks:
         """(label, place, covariance) of the mover, which is told now."""
         label, x, y, variance = tell(self.bodies, index, t)
         return label, (x, y), (variance, 0.0, variance)
+
+
+def _prints(body: Any) -> list[int]:
+    return [int(body[foot]) for foot in ("a_print", "b_print") if body[foot] >= 0]
 
 
 def _xy(body: Any) -> tuple[float, float]:

@@ -18,6 +18,8 @@ _AWAY_M, _SPEED, _GONE_S = 1.2, 1.2, 3.0
 _THERE_S = 0.5
 #: What seems to be a foot of the old one landed no later (s) after the new one began.
 _PUT_S = 0.5
+#: What has taken so many steps was a person.
+_STEPS = 3
 #: What somebody has stood on for so long (s) is his foot.
 _STANDS_S = 20.0
 
@@ -28,7 +30,7 @@ def suspect(bodies: Any, index: int, t: float) -> None:
     new = bodies[index]
     for b in range(bodies.size):
         body = bodies[b]
-        if b == index or not is_person(body) or body.stale or t - body.seen > _THERE_S:
+        if b == index or not may_have_been(body) or body.stale or t - body.seen > _THERE_S:
             continue
         if t - landed(body) > _STANDS_S:
             continue
@@ -37,6 +39,12 @@ def suspect(bodies: Any, index: int, t: float) -> None:
         gone_s = min(max(0.0, new.first - min(body.a_seen, body.b_seen)), _GONE_S)
         if away < _AWAY_M + _SPEED * gone_s:
             body.suspected = new.first
+
+
+@njit(cache=True)
+def may_have_been(body: Any) -> bool:
+    """Whether it is a person, or has become as wide as a robot after it had come on two feet."""
+    return bool(is_person(body) or (body.used and body.confirmed and not body.machine and body.own_stance_n >= _STEPS))
 
 
 @njit(cache=True)

@@ -40,7 +40,7 @@ def recognize(bodies: Any, least: float, most: float) -> int:
         alone = body.pushed < _ALONE and body.from_furniture <= 0 and rigid
         if body.wide < 0.6 or body.hits < _HITS or not alone or not least - _MARGIN_M < body.far < most + _MARGIN_M:
             continue
-        if norm(body.x - body.x0, body.y - body.y0) > _WAY_M:
+        if norm(body.x - body.walked_x, body.y - body.walked_y) > _WAY_M:
             body.machine, body.robot, body.from_furniture = 1, 1, -1
             found += 1
     return found

@@ -8,6 +8,7 @@ import pytest
 from tms_agents.floor.feet.brightness import expected
 from tms_agents.floor.feet.prints import ALONE, UNLIKE, attend
 from tms_agents.floor.movers.lone import count_lone
+from tms_agents.floor.scan.background import FOREGROUND, UNKNOWN
 from tms_agents.floor.state import BODY, PRINT, empty
 
 NOW = 100.0
@@ -17,10 +18,10 @@ _POSE = np.array([-3.0, 0.0, 0.0])
 _STEP = np.pi / (_BEAMS - 1)
 
 
-def counted(other: dict[str, float] | None = None, **fields: float) -> float:
+def counted(other: dict[str, float] | None = None, *, open_m: float = 9.0, **fields: float) -> float:
     """For how long (s) somebody is one foot alone after one second more: the other one was seen 0.6 m off, 5 s ago.
 
-    He came step by step; ``other`` is somebody else.
+    He came step by step; ``other`` is somebody else. The laser, 3 m off, sees ``open_m`` far.
     """
     bodies = empty(BODY, 2)
     values = {"used": 1, "confirmed": 1, "seen": NOW, "hits": 900, "both": 400, "own_stance_n": 20, "width": 0.1}
@@ -30,8 +31,8 @@ def counted(other: dict[str, float] | None = None, **fields: float) -> float:
         bodies[name][0] = value
     for name, value in (other or {}).items():
         bodies[name][1] = value
-    ranges = np.full(_BEAMS, 9.0)
-    states = np.zeros(_BEAMS, np.int8)
+    ranges = np.full(_BEAMS, open_m)
+    states = np.full(_BEAMS, FOREGROUND if open_m < 3.0 else UNKNOWN, np.int8)
     count_lone(bodies, 0, NOW, 1.0, (ranges, states, ranges, _POSE, -np.pi / 2, _STEP))
     return float(bodies["lone"][0])
 
@@ -66,6 +67,26 @@ def test_who_may_have_gone_is_not(fields: dict[str, float]) -> None:
 def test_somebody_who_began_beside_him_since_may_be_he(fields: dict[str, float], may_be_he: bool) -> None:
     new = {"used": 1, "first": NOW - 4.0, "x0": 0.7, "x": 3.0}
     assert counted(new | fields) == pytest.approx(1.0 if may_be_he else 0.1)
+
+
+@pytest.mark.parametrize(("both", "hidden"), [(400, True), (3, False)])
+def test_of_whom_two_feet_were_hardly_ever_seen_none_is_hidden(both: int, hidden: bool) -> None:
+    assert counted(open_m=1.0, both=both, own_stance_n=0) == pytest.approx(0.0 if hidden else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("fields", "alone"),
+    [
+        ({"by": 1.2}, True),
+        ({}, False),  # he may stand on both, side by side
+        ({"by": 1.2, "shoe": 0.0}, False),  # legs are wide for a while when one hides the other
+        ({"by": 1.2, "own_stance_n": 0}, False),  # nobody who walked: a robot, maybe
+    ],
+)
+def test_what_is_wide_is_no_pair_of_shoes_if_the_other_one_was_a_step_away(
+    fields: dict[str, float], alone: bool
+) -> None:
+    assert (counted(**{"width": 0.26, "shoe": 1.0} | fields) > 0.0) == alone
 
 
 def test_what_could_not_hide_the_other_foot_is_alone_though_he_was_in_sight() -> None:

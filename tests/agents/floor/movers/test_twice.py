@@ -65,13 +65,25 @@ def begins(gates: list[list[tuple[float, float]]], x0: float, y0: float, **field
         ([], 5.0, {}, False),
         ([DOOR], 7.0, {}, False),
         ([DOOR], 5.0, {"robot": 1, "machine": 1}, False),
+        ([DOOR], 5.0, {"robot": 1}, True),
+        ([DOOR], 5.0, {"robot": 1, "own_stance_n": 0}, False),
     ],
-    ids=["beside him", "no doors known", "too far away", "a robot"],
+    ids=["beside him", "no doors known", "too far away", "a robot", "who walked and is wide now", "what never walked"],
 )
 def test_who_begins_beside_one_who_stands_may_be_he(
     gates: list[list[tuple[float, float]]], x0: float, fields: dict[str, float], suspected: bool
 ) -> None:
     assert (begins(gates, x0, -0.5, **fields).bodies["suspected"][0] == NOW - 1.0) == suspected
+
+
+def test_it_is_remembered_whichever_hypothesis_turns_out_to_be_right() -> None:
+    one = room([DOOR])
+    stander(one.bodies[0], NOW - 1.5)
+    comer(one.bodies[1], 5.0, -0.5, NOW - 1.0)
+    association = one._association
+    association._now.bodies[1], association._count = one.bodies, 2
+    at(one, NOW)
+    assert association.hypotheses["suspected"][:, 0].tolist() == [NOW - 1.0, NOW - 1.0]
 
 
 @pytest.mark.parametrize(
@@ -125,6 +137,15 @@ def test_the_one_who_stands_is_a_thing_and_the_new_one_has_his_name() -> None:
     (label,) = one.labels(NOW)
     assert (label.id, label.since) == (1, 10.0) and label.xy[0] > 5.0
     assert one.bodies["own"][one.bodies["used"] == 1].tolist() == [7.0]
+    assert one.no_feet == [0]
+
+
+def test_so_is_what_he_pushed_there_which_is_furniture() -> None:
+    one = begins([DOOR], 5.0, -0.5, robot=1, wide=0.8, far=0.5, width=0.5, rest_at=NOW - 4.0, both=10)
+    events, _ = later(one, 5.0)
+    assert [(type(event), event.label) for event in events] == [(Vanished, 9), (Moved, 1)]
+    assert events[0].into == 1
+    assert (one.no_feet, one.furniture) == ([0], [0])
 
 
 def test_without_anybody_new_he_stands_there_for_much_longer() -> None:

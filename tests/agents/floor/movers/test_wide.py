@@ -19,7 +19,17 @@ def wide(share: float, **fields: float) -> np.ndarray:
     """It came from 2 m away, like two feet from afar, took no steps, and was 0.5 m wide in such a share of late."""
     bodies = empty(BODY, 1)
     seen = {"used": 1, "confirmed": 1, "label": 1, "hits": 300, "looks": 300, "both": 90, "seen": NOW, "a_seen": NOW}
-    looks = {"wide": share, "far": 0.5, "width": 0.5, "x0": 2.0, "x": 4.0, "ax": 4.0, "quality": 1.0, "b_seen": -1e9}
+    looks = {
+        "wide": share,
+        "far": 0.5,
+        "width": 0.5,
+        "x0": 2.0,
+        "walked_x": 2.0,
+        "x": 4.0,
+        "ax": 4.0,
+        "quality": 1.0,
+        "b_seen": -1e9,
+    }
     for name, value in (seen | looks | {"a_print": -1, "b_print": -1, "told_x": 4.0, "rest_x": 4.0} | fields).items():
         bodies[name] = value
     return bodies
@@ -33,6 +43,13 @@ def test_a_robot_that_comes_near_is_told_before_it_is_taken_for_furniture() -> N
             break
         assert not misled(bodies[0])
     assert bodies["robot"][0] == 1
+
+
+@pytest.mark.parametrize(("walked_x", "robot"), [(2.0, True), (3.5, False)])
+def test_who_walked_and_is_wide_since_is_a_robot_only_if_it_goes_on(walked_x: float, robot: bool) -> None:
+    """Who pushes something is one thing with it for a while, and leaves it there."""
+    bodies = wide(0.9, both=20, own_stance_n=5, walked_x=walked_x)
+    assert recognize(bodies, *sizes(())) == robot
 
 
 def test_what_is_wide_and_no_robot_is_furniture() -> None:

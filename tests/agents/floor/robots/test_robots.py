@@ -11,7 +11,7 @@ from tms_agents.floor.state import BODY, empty
 def looks_like_a_robot(**fields: float) -> bool:
     """Whether what has gone 2 m and is half a metre wide by now is taken for a robot; ``fields`` as in `BODY`."""
     bodies = empty(BODY, 1)
-    known = {"used": 1, "confirmed": 1, "hits": 60, "wide": 0.8, "far": 0.5, "x0": 2.0, "x": 4.0}
+    known = {"used": 1, "confirmed": 1, "hits": 60, "wide": 0.8, "far": 0.5, "x0": 2.0, "walked_x": 2.0, "x": 4.0}
     for name, value in (known | fields).items():
         bodies[name] = value
     found = recognize(bodies, 0.3, 0.9)
