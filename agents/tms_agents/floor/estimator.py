@@ -50,7 +50,7 @@ _EDGE_M = 0.12
 #: What brought nothing so lately (s) is black or glossy; so wide (m) it is no thing that somebody puts down.
 _MUTE_S, _DARK_M = 1.0, 0.3
 #: Of saved states; 25: where somebody went on two feet last.
-_FORMAT = 25
+_FORMAT = 26
 
 
 class FloorEstimator:

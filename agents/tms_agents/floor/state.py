@@ -29,6 +29,7 @@ PRINT = np.dtype(
         ("beams", "f8"),  # of a sighting, in the mean
         ("near", "f8"),  # m, how far it is from the laser
         ("spacing", "f8"),  # m, how far apart beams are there
+        ("missed", "f8"),  # share of the scans, of late, in which nothing was seen of it
         ("attached", "f8"),  # share of the last twenty sightings in which it was joined to the background
         ("owner", "i8"),  # body whose foot it is, -1: nobody's
         ("whose", "i8"),  # label of the last one
@@ -157,6 +158,7 @@ _BESIDES = [
     ("stay_lands", "f8"),  # how often feet landed there
     ("broadest", "f8"),  # m, the broader of what was seen of it last
     ("spacing", "f8"),  # m, how far apart beams are there
+    ("missed", "f8"),  # share of the scans, of late, in which nothing was seen of it
     ("quality", "f8"),  # how much what is seen of it looks like feet, of late
     ("single", "f8"),  # s for which one thing is all that is seen of it
     ("still", "f8"),  # s for which neither foot has moved

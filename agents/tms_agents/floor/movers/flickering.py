@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from tms_agents.floor.feet.build import knows_feet
+from tms_agents.floor.feet.build import knows_feet, wears_shoes
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.background import FOREGROUND
 from tms_agents.floor.scan.furniture import ADOPTED, MOVED
@@ -22,6 +22,8 @@ _STAYS_LONG_S, _NOW_AND_THEN_S, _NOW_AND_THEN = 12.0, 1.0, 0.12
 #: far away that beams are farther apart than this (m).
 _THIN_M, _THIN_LEGS, _THIN_SHOES, _THIN_FAR = 0.05, 0.4, 0.7, 0.85
 _FAR_M = 0.02
+#: Of shoes that stand something comes back in more than a share of this less than 1 of the scans.
+_MISSED = 0.6
 #: Nobody's feet land so often (1/s) in so long (s), seen from as far; nearby each scan sees a leg anew that swings.
 _LANDS_S, _LEGS_LAND, _SHOES_LAND = 8.0, 4.5, 3.5
 #: What is pushed goes so far (m) at most.
@@ -49,14 +51,14 @@ def note_stay(body: Any, dt: float, legs: bool) -> None:
 
 
 @njit(cache=True)
-def flickers(body: Any, legs: bool) -> bool:
+def flickers(body: Any, legs: bool, t: float) -> bool:
     """Whether it is furniture of which now this comes back, now that: no person looks so where he stays.
 
     Where people show ``legs`` more is known of them.
     """
     if body.robot or body.machine:
         return False
-    return bool(_is_thin(body, legs) or _lands(body, legs) or _is_broad(body, legs))
+    return bool(_is_thin(body, legs) or _is_seldom(body, t) or _lands(body, legs) or _is_broad(body, legs))
 
 
 @njit(cache=True)
@@ -65,6 +67,13 @@ def _is_thin(body: Any, legs: bool) -> bool:
     share = _THIN_LEGS if legs else _THIN_SHOES if body.spacing < _FAR_M else _THIN_FAR
     thin = body.stay > _STAYS_S and body.stay_thin > share * body.stay
     return bool(thin or (body.hits > _OFTEN and body.far < _PART_M))
+
+
+@njit(cache=True)
+def _is_seldom(body: Any, t: float) -> bool:
+    """Hardly ever seen, and then too thin for shoes, where it rests."""
+    seldom = body.missed > _MISSED and body.width < _THIN_M and t - body.rest_at > _STAYS_S
+    return bool(seldom and wears_shoes(body))
 
 
 @njit(cache=True)

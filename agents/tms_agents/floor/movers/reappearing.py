@@ -9,7 +9,7 @@ from tms_agents.floor.feet.bodies import stuck
 from tms_agents.floor.movers.absent import Absent
 from tms_agents.floor.movers.lone import has_walked
 from tms_agents.floor.movers.pair import is_pair
-from tms_agents.floor.movers.review import is_footless
+from tms_agents.floor.movers.parked import is_footless
 from tms_agents.floor.movers.twice import landed
 from tms_agents.floor.movers.whereabouts import Whereabouts
 

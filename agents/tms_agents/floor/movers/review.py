@@ -9,11 +9,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tms_agents.floor.feet.bodies import misled
-from tms_agents.floor.feet.build import SHOES
 from tms_agents.floor.feet.person import is_person
 from tms_agents.floor.movers.flickering import flickers, note_stay
-from tms_agents.floor.movers.lone import count_lone, has_come, has_walked
+from tms_agents.floor.movers.lone import count_lone
 from tms_agents.floor.movers.pair import is_pair
+from tms_agents.floor.movers.parked import BESIDE, KNOWN, PARKED_S, WIDE_M, is_footless, is_parked, is_piece
 from tms_agents.floor.norm import norm
 from tms_agents.floor.scan.freespace import FREE, HIDDEN, UNSEEN, WALLED, Sight, clear
 from tms_agents.floor.scan.masks import distance
@@ -33,24 +33,12 @@ _LONE_S = 4.0
 _SINGLE_S = 5.0
 #: No leg is broader (m).
 WIDEST_LEG_M = 0.2
-#: What was pushed stands still for so long (s): it is furniture.
-_PARKED_S = 5.0
-#: Who has not come from elsewhere on two feet, and rests for so long (s), is a thing.
-_INERT_S = 30.0
-#: No leg and no shoe looks so broad in the long run (m); so broad (m) a person is never, and of a person two feet are
-#: seen in this share of the scans at least.
-_BROAD_LEG_M, _BROAD_SHOE_M, _FAR_M, _FEET = 0.27, 0.45, 0.35, 0.25
-#: Where legs are seen, two side by side are hardly ever so broad (m) in the mean while somebody stands; what is no
-#: narrower than this (m) may be furniture, and is looked at when it has rested for so long (s).
-_SIDE_BY_SIDE_M, _BLOCK_M, _SETTLED_S = 0.26, 0.18, 8.0
-#: What moved with people beside it for this share of its way may have been pushed.
-_BESIDE = 0.15
+#: What is seen is remembered for so long (s).
+_MISSED_S = 2.5
 #: Who stays within this (m) rests.
 _REST_M = 0.15
 #: How much what is seen of a mover must look like feet (`footlike`) in the long run if it is so narrow (m) in the mean.
 _QUALITY, _THIN_M = 0.3, 0.05
-#: Who was seen so often is somebody.
-_KNOWN = 200
 #: Who is believed was seen so often, and in this share of the scans that should have shown him.
 _HITS, _STEADY = 4.0, 0.6
 #: Of who is believed every sighting looks so much like feet (`footlike`), in the mean.
@@ -94,58 +82,6 @@ def _has_come(body: Any, t: float, sight: Sight) -> bool:
     if a or (body.b_seen == t and norm(body.bx - body.x0, body.by - body.y0) < _STILL_THERE_M):
         return True
     return bool(vacant(body.x0, body.y0, _BEGAN_M, sight))
-
-
-@njit(cache=True)
-def _is_parked(body: Any, t: float, legs: bool) -> bool:
-    """Whether it is as wide as furniture, has never gone far by itself, and stands still.
-
-    Where people show ``legs`` nobody stands who is so broad.
-    """
-    if body.machine:
-        return False
-    since = body.a_since if body.a_seen >= body.b_seen else body.b_since
-    if body.wide > 0.5:
-        # What is wide goes without landing anew.
-        return bool(t - max(since, body.rest_at) > _PARKED_S)
-    if legs and body.width > _SIDE_BY_SIDE_M and t - body.rest_at > 2.0 * _PARKED_S:
-        return True
-    inert = t - body.rest_at > _INERT_S and not body.robot and not has_come(body)
-    if inert and not is_somebody(body):
-        return True
-    if body.pushed < _BESIDE and body.from_furniture != 1 and not _is_known(body):
-        # It came by itself.
-        return False
-    # Furniture half hidden by who pushes it: as broad as no leg or shoe, or broad once and hardly ever on two feet.
-    rests = t - body.rest_at
-    broad = body.width > (_BROAD_SHOE_M if body.shoe >= SHOES else _BROAD_LEG_M)
-    return bool((broad and rests > _PARKED_S) or (is_footless(body) and rests > 2.0 * _PARKED_S))
-
-
-@njit(cache=True)
-def _is_piece(body: Any, t: float) -> bool:
-    """Whether all that is seen of it is one thing that rests, broad enough for a piece of furniture."""
-    one = body.a_print == body.b_print or max(t - body.a_seen, t - body.b_seen) > 1.0
-    rests = t - body.rest_at > _SETTLED_S
-    return bool(one and rests and body.width > _BLOCK_M and not body.robot and not body.machine)
-
-
-@njit(cache=True)
-def is_somebody(body: Any) -> bool:
-    """Whether it is a person for certain: if what is seen now is none, he is somewhere else."""
-    return bool(_is_known(body) or has_walked(body))
-
-
-@njit(cache=True)
-def _is_known(body: Any) -> bool:
-    """Whether two feet have been seen so often that it is a person."""
-    return bool(body.hits > _KNOWN and body.both > _FEET * body.hits)
-
-
-@njit(cache=True)
-def is_footless(body: Any) -> bool:
-    """Whether it has been broader than two feet side by side, and two feet were hardly ever seen."""
-    return bool(not body.machine and body.far > _FAR_M and body.both < _FEET * body.hits and not has_walked(body))
 
 
 @njit(cache=True)
@@ -207,9 +143,10 @@ def review(
         if not body.used:
             continue
         unseen = t - body.seen
-        broad = body.wide > 0.3 or body.far > (_FAR_M if body.confirmed else WIDEST_LEG_M) or body.from_furniture == 1
+        broad = body.wide > 0.3 or body.far > (WIDE_M if body.confirmed else WIDEST_LEG_M) or body.from_furniture == 1
         if broad and unseen == 0.0 and norm(body.vx, body.vy) > 0.08:
             body.pushed += 0.08 * ((1.0 if _accompanied(bodies, b, t) else 0.0) - body.pushed)
+        body.missed += min(1.0, dt / _MISSED_S) * ((1.0 if unseen > 0.0 else 0.0) - body.missed)
         if unseen == 0.0:
             if norm(body.x - body.rest_x, body.y - body.rest_y) > _REST_M:
                 body.rest_x, body.rest_y, body.rest_at = body.x, body.y, t
@@ -229,8 +166,8 @@ def _new(bodies: Any, b: int, t: float, sight: Sight, waits: Waits, learned: boo
     unseen = t - body.seen
     way = norm(body.x - body.x0, body.y - body.y0)
     age = body.seen - body.first
-    furniture = body.from_furniture == 1 or body.pushed > _BESIDE
-    parked = furniture and t - body.rest_at > _PARKED_S
+    furniture = body.from_furniture == 1 or body.pushed > BESIDE
+    parked = furniture and t - body.rest_at > PARKED_S
     stays = (age > 3.0 and way < 0.15) or (age > _UNSURE_S and body.wide < 0.3 and body.from_furniture == 0)
     pair = stays and is_pair(body, t)
     if unseen > 0.45 or (stays and not pair) or parked or body.hits < 0.5 * body.looks - 1.0:
@@ -279,17 +216,17 @@ def _seen(bodies: Any, b: int, t: float, dt: float, sight: Sight, legs: bool) ->
     count_lone(bodies, b, t, dt, sight)
     single = not body.robot and body.wide < 0.15 and max(t - body.a_seen, t - body.b_seen) > 0.9
     body.single = body.single + dt if single else 0.0
-    if body.lone > _LONE_S or (misled(body) and body.hits > _KNOWN):
+    if body.lone > _LONE_S or (misled(body) and body.hits > KNOWN):
         # One thing that does not move is no person: whoever it was is somewhere else.
         return LOST
-    if (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or _is_parked(body, t, legs):
+    if (body.quality < _QUALITY and body.width < _THIN_M) or misled(body) or is_parked(body, t, legs):
         return THING
-    if flickers(body, legs):
+    if flickers(body, legs, t):
         # One thing alone does not flicker.
         return THING if body.single > _SINGLE_S else FLICKERS
     if body.stale:
         return BACK
-    if int(t) > int(t - dt) and _is_piece(body, t):
+    if int(t) > int(t - dt) and is_piece(body, t):
         # Once a second: to look what has gone from the background takes longer than all of this.
         return PIECE
     if norm(body.x - body.told_x, body.y - body.told_y) > _TELL_M:

@@ -15,6 +15,7 @@ from tms_agents.floor.movers.absent import Absent
 from tms_agents.floor.movers.doubts import Doubts
 from tms_agents.floor.movers.flickering import Flickering
 from tms_agents.floor.movers.meetings import Meetings
+from tms_agents.floor.movers.parked import is_footless, is_somebody
 from tms_agents.floor.movers.reappearing import missing_one
 from tms_agents.floor.movers.review import (
     BACK,
@@ -30,8 +31,6 @@ from tms_agents.floor.movers.review import (
     WIDEST_LEG_M,
     Waits,
     doubled,
-    is_footless,
-    is_somebody,
     outside,
     review,
     unseen,

@@ -54,11 +54,13 @@ def stays(
     thin: int = 0,
     lands: int = 0,
     feet: int = 2,
+    echoes: int = 10,
     **fields: float,
 ) -> Tracks:
     """Somebody shows so many ``feet`` for so long, in ``broad`` of ten scans something 0.4 m broad, in ``thin`` 3 cm.
 
-    Every three seconds he is ``moves_m`` farther, and in ``lands`` of ten scans a foot has landed.
+    Every three seconds he is ``moves_m`` farther, and in ``lands`` of ten scans a foot has landed. In ``echoes`` of ten
+    scans something of him comes back, now and then.
     """
     scene = Scene(region=[(0.0, -4.0), (9.0, -4.0), (9.0, 4.0), (0.0, 4.0)], gates=[])
     one = Tracks(Association(3, 4), FloorSettings(), scene)
@@ -75,6 +77,7 @@ def stays(
         "rest_x": 4.0,
         "stay_x": 4.0,
         "rest_at": NOW,
+        "seen": NOW,
     }
     for name, value in (known | seen | place | fields).items():
         body[name] = value
@@ -82,6 +85,10 @@ def stays(
         t = NOW + 0.1 * scan
         for name in ("x", "ax", "bx"):
             body[name] += moves_m * (scan % 30 == 0)
+        if scan * echoes % 10 >= echoes:
+            one.review(t, 0.1, OPEN, lambda: 9, lambda _: False, lambda _: False, learned=True, legs=legs)
+            continue
+        body["clear"] = 0.0
         body["seen"] = body["a_seen"] = t
         body["b_seen"], body["lone"] = t if feet == 2 else NOW - 60.0, 0.0
         body["broadest"] = 0.4 if scan % 10 < broad else 0.03 if scan % 10 >= 10 - thin else 0.1
@@ -162,6 +169,27 @@ def test_who_stays_is_hardly_ever_thin_and_steps_seldom(
 ) -> None:
     one = stays(0, seconds, thin=thin, lands=lands, **given)  # type: ignore[arg-type]
     assert bool(one.flickering.places) == found
+
+
+RARE = SHOES | {"legs": False, "width": 0.03}
+
+
+@pytest.mark.parametrize(
+    ("echoes", "seconds", "given", "found"),
+    [
+        (3, 9.0, RARE, True),
+        (5, 30.0, RARE, False),
+        (3, 6.0, RARE, False),
+        (3, 30.0, RARE | {"width": 0.1}, False),
+        (3, 30.0, {"width": 0.03}, False),
+        (3, 30.0, RARE | {"moves_m": 0.2}, False),
+    ],
+    ids=["seldom", "half of the time", "not for long", "a shoe", "legs", "it moves"],
+)
+def test_shoes_that_stand_are_seen_more_often_than_not(
+    echoes: int, seconds: float, given: dict[str, float], found: bool
+) -> None:
+    assert bool(stays(0, seconds, echoes=echoes, **given).flickering.places) == found  # type: ignore[arg-type]
 
 
 def view(ranges: np.ndarray) -> SimpleNamespace:
