@@ -8,7 +8,6 @@ from numba import njit
 
 from tms_agents.floor.feet.build import LEGS_KNOWN, SHOES
 from tms_agents.floor.movers.lone import has_come, has_walked
-from tms_agents.floor.state import NEVER
 
 #: What was pushed stands still for so long (s): it is furniture.
 PARKED_S = 5.0
@@ -22,9 +21,10 @@ _BROAD_LEG_M, _BROAD_SHOE_M, _FEET = 0.27, 0.45, 0.25
 #: Where legs are seen, two side by side are hardly ever so broad (m) in the mean while somebody stands; what is no
 #: narrower than this (m) may be furniture, and is looked at when it has rested for so long (s).
 _SIDE_BY_SIDE_M, _BLOCK_M, _SETTLED_S = 0.26, 0.18, 8.0
-#: Where somebody began who may be he, what rests for so long (s) and looks so much (m) wider or narrower than a leg of
-#: his is none; nor is one thing alone, for so long (s), thinner (m) than a shoe from most sides, that rests longer (s).
-_LEFT_S, _UNLIKE_M = 4.0, 0.05
+#: Where somebody began of late (s) who may be he, what rests for so long (s) and looks so much (m) wider or narrower
+#: than a leg of his is none; nor is one thing alone, for so long (s), thinner (m) than a shoe from most sides, that
+#: rests longer (s).
+_BEGAN_S, _LEFT_S, _UNLIKE_M = 30.0, 4.0, 0.05
 _LEFT_ALONE_S, _THIN_SHOE_M, _SHOE_LEFT_S = 2.0, 0.1, 6.0
 #: What moved with people beside it for this share of its way may have been pushed.
 BESIDE = 0.15
@@ -34,7 +34,7 @@ KNOWN = 200
 
 @njit(cache=True)
 def is_parked(body: Any, t: float, legs: bool) -> bool:
-    """Whether it is as wide as furniture, has never gone far by itself, and stands still.
+    """Whether it stands still and is no person: as wide as furniture, not come by itself, or unlike his feet.
 
     Where people show ``legs`` nobody stands who is so broad.
     """
@@ -69,8 +69,8 @@ def _is_too_wide(body: Any) -> bool:
 
 @njit(cache=True)
 def _is_left(body: Any, t: float) -> bool:
-    """Whether somebody began who may be who it was, and it does not look like his feet."""
-    if body.suspected <= NEVER or body.robot:
+    """Whether somebody began of late who may be who it was, and it does not look like his feet."""
+    if t - body.suspected > _BEGAN_S or body.robot:
         return False
     rests = t - body.rest_at
     if body.shoe >= SHOES:

@@ -115,10 +115,11 @@ def test_nobody_who_stands_is_wider_than_both_his_legs(
         (0.16, 5.0, 90.0, True),
         (0.03, 5.0, 90.0, True),
         (0.16, 5.0, NEVER, False),
+        (0.16, 5.0, 60.0, False),
         (0.16, 3.0, 90.0, False),
         (0.12, 20.0, 90.0, False),
     ],
-    ids=["wider", "thinner", "nobody began who may be he", "not for long", "like his"],
+    ids=["wider", "thinner", "nobody began who may be he", "long ago", "not for long", "like his"],
 )
 def test_where_somebody_began_who_may_be_he_a_leg_unlike_his_is_a_thing(
     width: float, rests_s: float, began: float, thing: bool
